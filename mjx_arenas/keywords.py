@@ -127,6 +127,11 @@ def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str | None:
     )
 
 
+def letters(name: str) -> str:
+    """A name without its digits: another number is no misspelling."""
+    return "".join(c for c in name if not c.isdigit())
+
+
 def near_file(path: str) -> str:
     """The end of a sentence about a file that is not there: the one beside it whose name is nearest; "" if none is near."""
     folder, name = os.path.split(path)

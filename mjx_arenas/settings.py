@@ -177,8 +177,15 @@ def _refused(path: str, rule: str, got: Any = None, **numbers: Any) -> Exception
     return error([_problem(path, rule, got, **numbers)])
 
 
-def given(dotted: str, value: Any) -> dict[str, Any]:
-    """A configuration of one value by its dotted name."""
+def given(dotted: str, value: Any, source: str = "") -> dict[str, Any]:
+    """A configuration of one value by its dotted name.
+
+    Raises:
+        ValueError: it is in a part that files alone have; the sentence begins with the `source`.
+    """
+    part, _, inner = dotted.partition(".")
+    if part in _OVERLAYS:
+        raise _refused(dotted, "setting_of_files", value, file=source, instead=f"`{inner or 'ppo.num_envs'}`")
     for name in reversed(dotted.split(".")):
         value = {name: value}
     return value

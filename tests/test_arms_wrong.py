@@ -198,9 +198,18 @@ def test_wrong_arguments(case):
 
 
 CONFIGS = {
-    "scale": ({"action_scale": -1.0}, "`config.action_scale` must be a number > 0, got -1.0."),
-    "no scale": ({"action_scale": 0.0}, "`config.action_scale` must be a number > 0, got 0.0."),
-    "nan": ({"action_scale": float("nan")}, "`config.action_scale` must be a number > 0, got nan."),
+    "scale": (
+        {"action_scale": -1.0},
+        "`config.action_scale` must be a number > 0 and <= 10, with which a step is 0.25 m, got -1.0.",
+    ),
+    "no scale": (
+        {"action_scale": 0.0},
+        "`config.action_scale` must be a number > 0 and <= 10, with which a step is 0.25 m, got 0.0.",
+    ),
+    "nan": (
+        {"action_scale": float("nan")},
+        "`config.action_scale` must be a number > 0 and <= 10, with which a step is 0.25 m, got nan.",
+    ),
     "length": ({"episode_length": 0}, "`config.episode_length` must be a whole number >= 1, got 0."),
     "late": (
         {"action_delay": (0, 75)},
@@ -363,7 +372,10 @@ def test_an_arena_is_of_one_task():
     """Its arm is in it already."""
     arena = mja.TableArena()
     Reach(arena=arena, on=0, config_overrides=WARP)
-    with pytest.raises(ValueError, match=r"^`attach`: the arena is compiled already: attach before the first use"):
+    with pytest.raises(
+        ValueError,
+        match=r"^`arena` is compiled already, or is another task.s, so that the arm cannot be put into it: make one",
+    ):
         Reach(arena=arena, on=0, config_overrides=WARP)
 
 

@@ -21,6 +21,7 @@ ELSEWHERE = {
     "docs/furniture.md": "test_furniture.py",
     "docs/house.md": "test_terms.py",
     "docs/how_to/own_arm.md": "test_own_arm.py",
+    "docs/how_to/own_arm_task.md": "test_own_arm_task.py",
     "docs/how_to/own_task.md": "documented.py",
     "docs/pixels.md": "test_pixels.py",
     "docs/policies.md": "documented.py",

@@ -343,13 +343,16 @@ def policy(*shape):
     return lambda obs, key: (jnp.zeros(shape), {})
 
 
+REPORTS = ("nan_state", "nan_action", "invalid_arena", "dropped_contacts", "solver_limits")
+
+
 class Still:
     """An environment without a simulation."""
 
     action_size, _config = 1, types.SimpleNamespace(episode_length=1)
 
     def reset(self, key):
-        metrics = dict.fromkeys(("success", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits"), 0.0)
+        metrics = dict.fromkeys(("success", *REPORTS), 0.0)
         return State(None, {"state": jnp.zeros(2)}, jnp.zeros(()), jnp.zeros(()), metrics, {})
 
     def step(self, state, action):
@@ -367,6 +370,34 @@ def test_policies_get_another_key_in_each_step():
     mja.evaluate(policy, env, 2)
     jax.effects_barrier()
     assert len({*seen}) == len(seen) == 3
+
+
+def test_a_policy_that_draws_on_the_host():
+    def by_numpy(obs, key):
+        return jnp.full((2, 1), np.random.uniform()), {}
+
+    with pytest.warns(
+        UserWarning, match="^`policy` seems to draw with `np.random` or `random`: it is traced once"
+    ) as told:
+        mja.evaluate(by_numpy, Still(), 2)
+    assert len(told) == 1
+
+
+def test_a_state_of_another_environment():
+    state = jax.eval_shape(slide("jax")[1], keys())
+    one = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape[1:], x.dtype), state)
+
+    class Other(Slide):
+        def draw_task(self, key, params, qpos):
+            return {"more": jnp.zeros(2)}
+
+    with pytest.raises(ValueError, match=r"^`state` is of another environment, whose episodes have other numbers\."):
+        jax.eval_shape(Other().step, one, jnp.zeros(1))
+
+
+def test_milliseconds():
+    with pytest.warns(UserWarning, match=r"^`config\.ctrl_dt` is 40 s: it is in seconds, not in milliseconds\."):
+        Slide(ctrl_dt=40.0)
 
 
 def test_arenas_that_were_drawn_once_are_told():

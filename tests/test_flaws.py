@@ -104,7 +104,17 @@ def test_off_by_default():
     [
         ("action_delay", (2, 1), "`config.action_delay` must be least and most steps, two whole numbers from 0 on"),
         ("observation_delay", (0, 1, 2), "`config.observation_delay` must be least and most steps"),
-        ("action_noise", -0.1, "`config.action_noise` must be a standard deviation >= 0, got -0.1"),
+        (
+            "action_noise",
+            -0.1,
+            "`config.action_noise` must be a standard deviation >= 0 and <= 1, as actions are within -1 and 1, got",
+        ),
+        (
+            "action_noise",
+            50.0,
+            "`config.action_noise` must be a standard deviation >= 0 and <= 1, as actions are within -1 and 1, got",
+        ),
+        ("observation_noise", float("inf"), "`config.observation_noise` must be a standard deviation >= 0, got inf"),
     ],
 )
 def test_wrong(name, value, says):

@@ -60,7 +60,7 @@ def test_contacts_are_solved(arm):
 @pytest.mark.parametrize("arm", ["small", "yam"])
 def test_fingers_hold(arm, side):
     """Boxes outside the ranges of training, in an episode of 6 s by less than 3 mm. MuJoCo's own cone at least doubles it."""
-    option = lift.OWN.arena(arm_of(arm)).spec.option
+    option = lift.DEFAULTS.arena(arm_of(arm)).spec.option
     assert abs(slips(arm_of(arm), option, side)) < 5e-4
     assert slips(arm_of(arm), mujoco.MjOption(), side) > 1e-3
 
@@ -68,7 +68,7 @@ def test_fingers_hold(arm, side):
 @pytest.mark.parametrize("side", [SIZES.low, 0.03, SIZES.high])
 def test_pads_hold(side):
     """Those of the 2F-85, too; without the armature of its bars, which the package's gripper lacks, boxes sink faster."""
-    arm, option = arm_of("panda"), lift.OWN.arena(arm_of("panda")).spec.option
+    arm, option = arm_of("panda"), lift.DEFAULTS.arena(arm_of("panda")).spec.option
     assert abs(slips(arm, option, side)) < 5e-4
     without = dataclasses.replace(arm, spec=arm.spec.copy())
     for joint in without.spec.joints:

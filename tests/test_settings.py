@@ -76,6 +76,10 @@ WRONG = {
         "`ppo.num_resets_per_eval` must be a whole number >= 0, got -1.",
     ),
     "words for a length": (["--set", "ppo.demo_length=x"], "`ppo.demo_length` must be a whole number >= 1, got 'x'."),
+    "a part of files": (
+        ["--set", "cpu.ppo.num_env=3"],
+        "--set: `cpu.ppo.num_env` is a part of files alone: set `ppo.num_env` itself.",
+    ),
     "no seed": (["--set", "seed=-5"], "`seed` must be a whole number from 0 to 2^32 - 1, got -5."),
     "no names in env": (["--set", "env=3"], "--set: `env` must have names and values, got 3."),
     "no names in config": (["--set", "env.config=x"], "--set: `env.config` must have names and values, got 'x'."),
@@ -337,6 +341,9 @@ def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     (tmp_path / "mine.yaml").write_text(mine)
     (tmp_path / "kitchen.yaml").write_text(TABLE)  # whose table is called "table"
     (tmp_path / "my_task.py").write_text(pages.blocks("docs/how_to/own_task.md")[0][0])
+    (tmp_path / "push_aside.py").write_text(pages.blocks("docs/how_to/own_arm_task.md")[0][0])
+    few = [code for code, title in pages.blocks("docs/arms.md", "yaml") if title == "few_worlds.yaml"]
+    (tmp_path / "few_worlds.yaml").write_text(few[0])
     (tmp_path / "ur5e.py").write_text(pages.blocks("docs/how_to/own_arm.md")[0][0])
     (tmp_path / "lift_ur5e.yaml").write_text(pages.blocks("docs/how_to/own_arm.md", "yaml")[0][0])
     monkeypatch.syspath_prepend(models.ROBOTS)  # where the tests have robots' packages

@@ -471,9 +471,7 @@ def test_package_that_is_missing(monkeypatch, tmp_path):
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     with pytest.raises(ModuleNotFoundError) as error:
         mja.robots.load("panda")
-    said = (
-        "`name`: 'panda' comes with the package gym_hil, which is not installed: pip install --no-deps gym-hil==0.1.14."
-    )
+    said = "The robot 'panda' comes with the package gym_hil, which is not installed: pip install --no-deps gym-hil==0.1.14."
     assert str(error.value) == said
     (tmp_path / "gym_hil").mkdir()
     (tmp_path / "gym_hil" / "__init__.py").write_text("raise RuntimeError")  # it is not imported

@@ -1,6 +1,7 @@
 """What robots and parts of furniture can stand on (host)."""
 
 from mjx_arenas.furniture import standing, surfaces
+from mjx_arenas.keywords import letters, nearest
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
 from mjx_arenas.terms.parts import Parts
@@ -28,7 +29,10 @@ def carrier(path: str, on: object, parts: Parts, stays: bool, frames: bool = Fal
     if part is None:
         tops = surfaces.names([t.body for t in parts.tables], furniture)
         names = dict.fromkeys([*tops, *((one.name for one in furniture) if frames else ())])
-        told = {"later": ": furniture that carries it must be added first"} if isinstance(on, str) else {}
+        close = nearest(on, names) if isinstance(on, str) else None
+        near = close and letters(close) != letters(str(on))
+        later = f": {close!r} may be meant" if near else ": furniture that carries it must be added first"
+        told = {"later": later} if isinstance(on, str) else {}
         if not names:
             return problem(path, "no_carrier", None, on, told)
         return problem(path, "carrier", None, on, {"names": list(map(repr, names)), "optional": True, **told})

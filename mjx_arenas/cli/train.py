@@ -194,7 +194,7 @@ def _said(short: Mapping[str, Any], more: Sequence[tuple[str, str]], pixels: boo
             where = f"{_part(pixels)}.{where}" if name in _OF_LEARNER else where
             said.append((f"--{name}", settings.given(where, value)))
     for name, value in more:
-        said.append(("--set", settings.given(name, text.parse(value, pathlib.Path("--set")).data)))
+        said.append(("--set", settings.given(name, text.parse(value, pathlib.Path("--set")).data, "--set")))
     return said
 
 

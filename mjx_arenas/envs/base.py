@@ -342,7 +342,11 @@ class ArenaEnv(mjx_env.MjxEnv):
 
         otherwise = info["next_episode"], info["rng"]
         args = self._mjx_model, info["rng"], info["level"], info["episode"].params
-        (upcoming, rng), drawn = when_needed(draw, ~info["ready"], begins, otherwise, *args)
+        try:
+            (upcoming, rng), drawn = when_needed(draw, ~info["ready"], begins, otherwise, *args)
+        except TypeError:
+            refusals.check_alike(jax.eval_shape(draw, *args)[0], info["next_episode"])
+            raise
         return upcoming, rng, info["ready"] | drawn
 
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:

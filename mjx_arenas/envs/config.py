@@ -9,7 +9,7 @@ from ml_collections import config_dict
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import nearest, quoted
 from mjx_arenas.problem import problem
-from mjx_arenas.problems.messages import error
+from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.rules.validation import check_type, is_number, is_whole, whole
 
 NEEDED = ("ctrl_dt", "sim_dt", "impl", "arenas", "level", "level_step")
@@ -21,7 +21,7 @@ _KINDS = {
     int: "a whole number",
     float: "a number",
     str: "a text",
-    tuple: "a tuple",
+    tuple: "two numbers, or one whole number for both",
     config_dict.ConfigDict: "a dictionary",
 }
 """What values of a configuration must be, by their types."""
@@ -120,6 +120,8 @@ def check(config: Any, ranges: Any) -> None:
     ratio = config.ctrl_dt / config.sim_dt if config.sim_dt > 0 else 0.0
     if not 1 <= ratio < math.inf or abs(ratio - round(ratio)) > 1e-6:
         raise error([problem("config.ctrl_dt", "steps_of_control", None, config.ctrl_dt, sim_dt=config.sim_dt)])
+    if config.ctrl_dt > 1:
+        warn(problem("config.ctrl_dt", "long_step", None, None, seconds=config.ctrl_dt))
     must = "1, as `config.ctrl_dt` says how long an action is held"
     whole("config.action_repeat", config.get("action_repeat", 1), 1, 1, must)
     for name in ("level", "level_step"):

@@ -1,5 +1,6 @@
 """What a policy is worth: one episode in each of many arenas that no training has seen, on MJX or in C MuJoCo."""
 
+import functools
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +12,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.envs import worlds_in_c
+from mjx_arenas.envs import refusals, worlds_in_c
 from mjx_arenas.envs.base import ArenaEnv, Episode, sound
 from mjx_arenas.envs.trained_policy import TrainedPolicy
 from mjx_arenas.envs.worlds_in_c import shared
@@ -27,6 +28,7 @@ Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 _CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
 _CAUSES = {
     "not_finite": ("a number is not finite", _CHECK),
+    "bad_action": ("an action of the policy is not finite", "its networks, or what it computes, have such numbers"),
     "invalid": ("the arena is not valid", _CHECK),
     "impossible": (
         "the task is not possible",
@@ -43,6 +45,9 @@ class Log(NamedTuple):
     success: Any
     done: Any
     not_finite: Any
+    """A number of the state, of observations or of the score is not."""
+    bad_action: Any
+    """An action is not finite, which ends the episode."""
     invalid: Any
     """The arena or the task is not possible (`Episode.valid`)."""
     impossible: Any
@@ -61,7 +66,7 @@ def evaluate(
 
     Args:
         policy: `policy(observations, key)` returns actions (W, n) and extra information, like the policies of Brax and
-            `policies.load_policy`.
+            `policies.load_policy`. It is traced, also for C, and so computes with `jax.numpy` and draws with its key.
         env: an `ArenaEnv`. With `engine=None` it may be any environment with the same metrics.
         n_worlds: number of worlds W.
         seed: seed of the arenas, and of the keys that the policy gets, another one in each step.
@@ -89,6 +94,7 @@ def evaluate(
         setting = "`config.settled`" if env.config.settled else "`config.num_arenas`"
         warn(problem("env", "judged_on_drawn", None, None, {"of": n_worlds, "setting": setting}))
     keys = jax.random.split(jax.random.key(seed), n_worlds)
+    _check_actions(policy, env, keys, engine)
     log = _in_c(env, policy, keys) if engine == "c" else _on_mjx(env, policy, keys)
     _warn_of_reports(log)
     return shares(log)
@@ -108,6 +114,23 @@ def _check(policy: Any, env: Any, seed: Any, engine: str | None) -> None:
         )
     if not validation.is_whole(seed, 0, 2**32 - 1):
         raise validation.error([problem("seed", "seed", None, seed)])
+
+
+def _check_actions(policy: Policy, env: Any, keys: jax.Array, engine: str | None) -> None:
+    """Refuses what the policy cannot do with what it sees, or gives wrongly, before anything is compiled."""
+    seen = jax.eval_shape(_reset(env), keys).obs
+    if engine == "c" and isinstance(seen, Mapping) and any(name.startswith("pixels/") for name in seen):
+        raise validation.error([problem("env", "env_in_c")])
+    before = refusals.drawn_on_host()
+    jax.eval_shape(lambda obs: _actions(policy, obs, keys, 0, env), seen)
+    if refusals.drawn_on_host() != before:
+        warn(problem("policy", "policy_draws_on_host"))
+
+
+@functools.lru_cache(maxsize=4)
+def _reset(env: Any) -> Callable[[jax.Array], Any]:
+    """The compiled start of worlds of an environment, the same in each call."""
+    return jax.jit(jax.vmap(env.reset))
 
 
 def shares(log: Log) -> dict[str, float]:
@@ -170,7 +193,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             return state, record(state)
 
-        first = jax.vmap(env.reset)(keys)
+        first = _reset(env)(keys)
         return first, jax.lax.scan(step, first, jnp.arange(episode_length(env)))[1]
 
     return run(keys)
@@ -203,7 +226,7 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array, t: Any, env: Any) -> jax
 def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
     def record(state: Any) -> Log:
         told = {name: x > 0 for name, x in state.metrics.items()}
-        unsound = told["nan_state"], told["invalid_arena"], _impossible(state)
+        unsound = told["nan_state"], told["nan_action"], told["invalid_arena"], _impossible(state)
         return Log(told["success"], state.done > 0, *unsound, told["dropped_contacts"], told["solver_limits"])
 
     return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
@@ -222,11 +245,7 @@ def _judged(
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
-    reset = jax.jit(jax.vmap(env.reset))
-    seen = jax.eval_shape(reset, keys).obs
-    if isinstance(seen, Mapping) and any(name.startswith("pixels/") for name in seen):
-        raise validation.error([problem("env", "env_in_c")])
-    first = reset(keys)
+    first = _reset(env)(keys)
     episodes = first.info["episode"]
     start = data_.blank(env.mj_model)
     names = shared(start, mujoco.MjData(env.mj_model))
@@ -275,6 +294,7 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
             late, obs, ends, success, broken = score(values, episodes, actions, late, begins, t)
             begins = jnp.zeros_like(begins)
             unsound = np.array([one.broken for one in worlds]) | np.asarray(broken)
-            ended, never = np.asarray(ends) | unsound | np.asarray(wrong), np.zeros_like(unsound)
-            log.append(Log(np.asarray(success) > 0, ended, unsound, invalid, impossible, never, never))
+            wrong, never = np.asarray(wrong), np.zeros_like(unsound)
+            ended = np.asarray(ends) | unsound | wrong
+            log.append(Log(np.asarray(success) > 0, ended, unsound, wrong, invalid, impossible, never, never))
     return Log(*map(np.stack, zip(*log, strict=True)))

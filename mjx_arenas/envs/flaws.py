@@ -101,8 +101,10 @@ def of(config: config_dict.ConfigDict, neutral: Any) -> Flaws | None:
             must = "least and most steps, two whole numbers from 0 on, the first not above the second"
             found.append(problem(f"config.{name}", "must", None, value, must=must))
     for name in ("action_noise", "observation_noise"):
-        if not (validation.is_number(given[name]) and 0 <= given[name] < float("inf")):
-            found.append(problem(f"config.{name}", "must", None, given[name], must="a standard deviation >= 0"))
+        most = 1.0 if name == "action_noise" else float("inf")  # actions are within -1 and 1
+        if not (validation.is_number(given[name]) and 0 <= given[name] <= most and given[name] < float("inf")):
+            must = f"a standard deviation >= 0{' and <= 1, as actions are within -1 and 1' if most == 1 else ''}"
+            found.append(problem(f"config.{name}", "must", None, given[name], must=must))
     raise_all(found, "`config`")
     given |= {name: tuple(given[name]) for name in ("action_delay", "observation_delay")}
     return None if given == NONE else Flaws(tuple(np.asarray(neutral).tolist()), **given)

@@ -55,12 +55,14 @@ def of_init() -> Any:
     return _OfInit()
 
 
-def check_arena(arena: Any) -> None:
-    """Refuses what is no arena, and says what to do with a name or with what `load` gives."""
+def check_arena(arena: Any, open_for: str = "") -> None:
+    """Refuses what is no arena, and says what to do with a name or with what `load` gives; with `open_for` also one that is closed."""
     must = "an arena such as mjx_arenas.TableArena()"
     if isinstance(arena, (str, tuple)):
         must += ", or the first of the two that mjx_arenas.load(...) gives"
     check_type("arena", arena, Arena, must)
+    if open_for and arena.is_compiled:
+        raise error([problem("arena", "arena_taken", what=open_for)])
 
 
 def check_timestep(arena: Arena, sim_dt: float) -> None:
@@ -129,17 +131,17 @@ def asked(method: types.MethodType, *arguments: Any) -> Any:
         TypeError: it treats a traced number as if it were known, in an `if`, `float(...)` or NumPy.
     """
     called = f"{type(method.__self__).__name__}.{method.__name__}"
-    before = _drawn_on_host()
+    before = drawn_on_host()
     try:
         given = method(*arguments)
     except _TRACED as refused:
         raise error([problem(called, "traced")], kind=TypeError) from refused
-    if _drawn_on_host() != before:  # or another thread drew meanwhile, so it is no error
+    if drawn_on_host() != before:  # or another thread drew meanwhile, so it is no error
         warn(problem(called, "drawn_on_host"))
     return given
 
 
-def _drawn_on_host() -> bytes:
+def drawn_on_host() -> bytes:
     """What changes where numbers are drawn with `np.random` or `random`."""
     return pickle.dumps((np.random.get_state(legacy=False), random.getstate()))
 
@@ -199,6 +201,12 @@ def check_state(state: Any) -> None:
     check_type("state", state, State, "a State, as reset and step give it")
     if jnp.ndim(state.done):
         raise error([problem("state", "one_world", of=f"{len(state.done)} worlds", instead="use jax.vmap")])
+
+
+def check_alike(drawn: Any, given: Any) -> None:
+    """Raises where the episodes of a state are not like those that the environment draws."""
+    if jax.tree.map(jnp.shape, drawn) != jax.tree.map(jnp.shape, given):
+        raise error([problem("state", "state_of_another")])
 
 
 def check_action(action: Any, size: int) -> None:

@@ -267,7 +267,7 @@ GENERAL = {
     "the reference, or rename the {kind}.",
     "options": "{at} must be {known} or None, got {got}.",
     "no_robot_known": "{at}: no known robot is called {got}{nearest}",
-    "no_package": "{at}: {got} comes with the package {package}, which is not installed: {install}.",
+    "no_package": "The robot {got} comes with the package {package}, which is not installed: {install}.",
     "no_robot_file": "{at}: {got} needs {file} of the package {package}, but the installed version lacks it: {install}.",
     "no_option": "{at}: MuJoCo has no option {got}{nearest}",
     "collision": "{at} must be one of {names}, or a dictionary of these by names or regular expressions, got {got}.",

@@ -66,6 +66,9 @@ WARNINGS = {
     "which stands on what carries it.",
     "drawn_on_host": "{at} seems to draw with `np.random` or `random`: it is traced once, so that these numbers are the same in every "
     "world and episode. Draw with jax.random and its `key`, or `episode.key`.",
+    "long_step": "{at} is {seconds:g} s: it is in seconds, not in milliseconds.",
+    "policy_draws_on_host": "{at} seems to draw with `np.random` or `random`: it is traced once, so that it does the same in every step. "
+    "Draw with jax.random and its `key`.",
     "no_range": "{at} varies nothing, as `ranges.terms` has no range {name!r}.",
     "falling": "{at}: episodes start before what is dropped (`place.drop`) has come to rest: {names}. With "
     "`config_overrides={{'settled': 1024}}` they start in worlds in which it has.",

@@ -5,7 +5,7 @@ from typing import Any
 
 import mujoco
 
-from mjx_arenas.keywords import nearest
+from mjx_arenas.keywords import letters, nearest
 from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.rules.validation import table_index
 from mjx_arenas.spec.objects import Object
@@ -88,7 +88,7 @@ def _below(
     rule = "table" if table_names else "on_no_table"
     told: dict[str, Any] = {"tables": tuple(table_names)}
     close = nearest(on, (*table_names, *slab_names, *carriers)) if isinstance(on, str) else None
-    if close and _letters(close) != _letters(str(on)):  # another number is no misspelling
+    if close and letters(close) != letters(str(on)):  # another number is no misspelling
         told["later"] = f": {close!r} may be meant"
     elif isinstance(on, str) and ("object", on) != item:
         told["later"] = (
@@ -108,8 +108,3 @@ def _carrier_problems(carrier: Object, item: Item) -> list[Problem]:
     mixed = f"has variants{' in any resting pose' if resting else ', which are not all boxes or all cylinders'}"
     what = mixed if carrier.slots else f"is {kind}{' in any resting pose' if resting else ''}"
     return [problem("objects.on", "carrier_top", item, carrier.name, what=what)]
-
-
-def _letters(name: str) -> str:
-    """A name without its digits."""
-    return "".join(c for c in name if not c.isdigit())

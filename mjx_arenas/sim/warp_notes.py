@@ -123,8 +123,21 @@ def quiet(model: mjx.Model) -> mjx.Model:
     """`model` without Warp's lines on stdout, which take time; the data says the same."""
     if model.impl != Impl.WARP:
         return model
+    _finish_before_python()
     quieted: Any = model.tree_replace({"opt._impl.warn_overflow": 0})
     return quieted
+
+
+@functools.cache
+def _finish_before_python() -> None:
+    """Lets Python wait, when it ends, for steps that still run: on a CPU Warp calls it in each, and both would wait for ever."""
+
+    def wait() -> None:
+        for x in jax.live_arrays():
+            with contextlib.suppress(RuntimeError):  # which is deleted, or has said already why it is not there
+                x.block_until_ready()
+
+    atexit.register(wait)
 
 
 # Said once.

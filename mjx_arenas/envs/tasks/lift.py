@@ -15,7 +15,15 @@ from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import friction_on
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, firm_grips, gripped, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import (
+    TABLES_DECIDE,
+    ArmTask,
+    Defaults,
+    Given,
+    firm_grips,
+    gripped,
+    thing_numbers,
+)
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.spec.objects import Object
@@ -88,7 +96,7 @@ class Lift(ArmTask):
         config_overrides: Mapping[str, Any] | None = None,
         **given: Unpack[Given],
     ) -> None:
-        super().__init__(OWN, config or default_config(), config_overrides, **given)
+        super().__init__(DEFAULTS, config or default_config(), config_overrides, **given)
         refusals.check_object_there(self.arena, self._levels)
         if given:  # all that is the task's own is in reach
             unreached.warn_of_task(self.foot, self.arena, self._ranges_at(jnp.ones(())), HEIGHT)
@@ -126,4 +134,4 @@ def _table(arm: Arm) -> Arena:
     return firm_grips(TableArena((0.9, 0.9, 0.05), objects=[box], table_priority=TABLES_DECIDE))
 
 
-OWN = Own(_table, training_ranges, 0, manipulation.MOUNT, does="lift")
+DEFAULTS = Defaults(_table, training_ranges, 0, manipulation.MOUNT, does="lift")

@@ -34,6 +34,7 @@ from mjx_arenas.spec import names, specs
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
 TURN = 0.12  # [rad] that it turns it
 JOINT_STEP = 0.08  # [rad] or [m] that an action moves a joint
+MOST_SCALE = 10  # of a step
 AHEAD = 0.4  # [rad] or [m] that a servo's target is ahead of its joint at most
 BETWEEN = 0.02  # [m] from the tool to the middle of an object between the fingers; on top of it they are further away
 UPRIGHT = 0.5  # of a tilt of the tool, which a step takes back
@@ -115,17 +116,23 @@ class Hand(NamedTuple):
     tool: chain.Tool
 
 
-class Own(NamedTuple):
-    """Defaults of a task, used if no arena is given."""
+class Defaults(NamedTuple):
+    """What a task of an arm has of its own; arena, ranges and place of the arm only where no arena is given."""
 
     arena: Callable[[Arm], Arena]
+    """Makes its arena, for an arm whose reach it may ask for."""
     ranges: Callable[[], ArenaRanges]
-    on: int | str | None
+    """Makes its ranges."""
+    on: int | str | None = 0
+    """The table that carries the arm, by index or name; None: the arm stands in the world."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
+    """(3,) place of the foot of the arm there [m]."""
     marks: Callable[[mujoco.MjSpec], None] = lambda spec: None
     """Adds the marker of the goal to any arena."""
     does: str = ""
-    """Verb for what the task does to an object, if it needs one."""
+    """Verb for what the task does to the arena's first object, such as "lift", in messages; "": it needs no object."""
+    grips: bool = True
+    """Whether its gripper holds the object, which must then be narrow enough, and must not slip by its friction cone."""
     max_contacts: int = 48
     """Number for one world. By default an arena has room for contacts of any two parts, which is slow."""
 
@@ -165,7 +172,7 @@ class ArmTask(ArenaEnv):
     - `action_noise`, `observation_noise` (0.0): standard deviations of the noise that is added to them.
 
     Args:
-        own: the defaults of the task (arena, ranges, place of the arm), used if no arena is given.
+        defaults: those of the task (arena, ranges, place of the arm), used if no arena is given.
         config: configuration as from `default_config()`.
         config_overrides: dotted names and values.
         ranges: ranges of the arenas. None: those of the task; in an arena of your own nothing varies. The quantity "arm_start" is added to
@@ -190,40 +197,44 @@ class ArmTask(ArenaEnv):
 
     def __init__(
         self,
-        own: Own,
+        defaults: Defaults,
         config: config_dict.ConfigDict,
         config_overrides: Mapping[str, Any] | None = None,
         **given: Unpack[Given],
     ) -> None:
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
-        check_known(type(self).__name__, [*own_names, *Given.__annotations__], given)
+        check_known(type(self).__name__, [*dict.fromkeys([*own_names, *Given.__annotations__])], given)
         known.check_config(config)
         chosen: Any = chosen_config(config, config_overrides or {}, list(default_config()))
         if chosen.action not in ("cartesian", "joint"):
             raise error([problem("config.action", "must", None, chosen.action, must="'cartesian' or 'joint'")])
-        if not (is_number(chosen.action_scale) and 0 < chosen.action_scale < np.inf):
-            raise error([problem("config.action_scale", "must", None, chosen.action_scale, must="a number > 0")])
+        if not (is_number(chosen.action_scale) and 0 < chosen.action_scale <= MOST_SCALE):
+            must = f"a number > 0 and <= {MOST_SCALE}, with which a step is {MOST_SCALE * STEP} m"
+            raise error([problem("config.action_scale", "must", None, chosen.action_scale, must=must)])
         arm, arena = given.get("arm"), given.get("arena")
         arm, ranges, vision = known.small() if arm is None else arm, given.get("ranges"), given.get("vision")
         self._chain = moves.checked(arm)
-        if own.does and not arm.fingers:
-            raise error([problem("arm.fingers", "fingers_to", None, dict(arm.fingers), does=own.does)])
+        self._holds = bool(defaults.does) and defaults.grips
+        if self._holds and not arm.fingers:
+            raise error([problem("arm.fingers", "fingers_to", None, dict(arm.fingers), does=defaults.does)])
         moves.check_keyframe(arm, chosen.keyframe)
-        on, pos, usual = (own.on, own.pos, own.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
+        on, pos, usual = (
+            (defaults.on, defaults.pos, defaults.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
+        )
         on, pos = given.get("on", on), given.get("pos", pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
         x, y, z = pos
-        arena, sees = own.arena(arm) if arena is None else arena, vision is not None or chosen.vision
-        refusals.check_arena(arena)
-        if own.does and not arena.objects:
-            raise error([problem("arena", "an_object_to", None, None, does=own.does)])
+        arena, sees = defaults.arena(arm) if arena is None else arena, vision is not None or chosen.vision
+        refusals.check_arena(arena, open_for="the arm")
+        if defaults.does and not arena.objects:
+            raise error([problem("arena", "an_object_to", None, None, does=defaults.does)])
         if sees:
             looks.check(arena, arm.spec, arm.tool)
         if ranges is None:
             ranges = looks.with_looks(usual(), len(arena.objects), wrist=True) if sees else usual()
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on, keyframe=chosen.keyframe)
-        own.marks(arena.spec)
+        defaults.marks(arena.spec)
         arena.vary(**{START: dr.Term("joint.qpos", [PREFIX + name for name in self._chain.joints])})
         ranges = dynamics.vary(arena, PREFIX, ranges, given.get("terms"), given.get("robot_strength", 0.0))
         if sees:
@@ -232,7 +243,7 @@ class ArmTask(ArenaEnv):
             looks.add_camera(arena, eye.tolist(), at.tolist(), PREFIX + arm.base)
             wrist_camera.add(arena, specs.compiled(arm.spec, "arm.spec"), chosen.keyframe, arm.tool, PREFIX)
         if given.get("arena") is None and chosen.get("max_contacts") is None:
-            chosen.update(max_contacts=own.max_contacts)
+            chosen.update(max_contacts=defaults.max_contacts)
         super().__init__(arena, ranges, chosen, keyframe=PREFIX + chosen.keyframe, vision=vision)
         model, self.arm, base = self.arena.mj_model, arm, PREFIX + arm.base
         joints = [model.joint(PREFIX + name) for name in self._chain.joints]
@@ -242,9 +253,10 @@ class ArmTask(ArenaEnv):
         self._grips = grips.grips(model, {PREFIX + name: controls for name, controls in arm.fingers.items()})
         self._base = model.body(base).id
         self._links = chain.varied(model, base, PREFIX + arm.tool, self.arena.record.scene.touched(self._varying))
-        if own.does:
+        if self._holds:
             graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
+        if defaults.does:
             self.foot = Foot.of(self.arena, base, arm, moves.moves(arm, self._chain, chosen.keyframe))
         self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
         self.flaws = flaws.of(chosen, self.neutral_action)
@@ -354,10 +366,11 @@ class ArmTask(ArenaEnv):
         return pos, dot("ki,kj->ij", data.xmat[self._base], quaternions.quat_to_mat(quat))
 
     def takes(self, params: ArenaParams, qpos: jax.Array, lift: float = 0.0) -> jax.Array:
-        """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and its gripper takes it."""
+        """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and takes it if it must."""
         place = self.middle(params, qpos)
         beyond = self.foot.beyond(params, jnp.stack([place, place.at[2].add(lift)])).max()
-        return (beyond <= graspable.SLACK) & graspable.taken(self.arena, params, self.arm.width)
+        reached = beyond <= graspable.SLACK
+        return reached & graspable.taken(self.arena, params, self.arm.width) if self._holds else reached
 
     def thing_velocity(self, data: mjx.Data) -> jax.Array:
         """(3,) velocity of the first object in the axes of the arm's base [m/s]."""

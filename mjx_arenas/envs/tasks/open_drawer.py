@@ -18,7 +18,7 @@ from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.arms.opening import thinnest
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
-from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Defaults, Given
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
 from mjx_arenas.furniture.part import Box, named
 from mjx_arenas.furniture.standing import frames, numbers_of
@@ -128,7 +128,7 @@ class OpenDrawer(ArmTask):
         unit: str = UNIT,
         **given: Unpack[Given],
     ) -> None:
-        super().__init__(OWN, config or default_config(), config_overrides, **given)
+        super().__init__(DEFAULTS, config or default_config(), config_overrides, **given)
         self._parts = self.arena.layout.places.furniture
         units = {i: part for i, part in enumerate(self._parts) if isinstance(part, Drawers)}
         names = [part.name for part in units.values()]
@@ -256,4 +256,4 @@ def _before_a_unit(arm: Arm) -> Arena:
     return arena
 
 
-OWN = Own(_before_a_unit, training_ranges, 0)
+DEFAULTS = Defaults(_before_a_unit, training_ranges, 0)

@@ -16,7 +16,15 @@ from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import manipulation
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, surface_numbers
-from mjx_arenas.envs.tasks.manipulation import TABLES_DECIDE, ArmTask, Given, Own, firm_grips, gripped, thing_numbers
+from mjx_arenas.envs.tasks.manipulation import (
+    TABLES_DECIDE,
+    ArmTask,
+    Defaults,
+    Given,
+    firm_grips,
+    gripped,
+    thing_numbers,
+)
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
@@ -122,7 +130,7 @@ class PickAndPlace(ArmTask):
         goals: str | Sequence[str] | None = None,
         **given: Unpack[Given],
     ) -> None:
-        super().__init__(OWN, config or default_config(), config_overrides, **given)
+        super().__init__(DEFAULTS, config or default_config(), config_overrides, **given)
         refusals.check_object_there(self.arena, self._levels)
         self._goals = goals_.surface_indices(self.arena, goals)
         refusals.check_goals_there(self.arena, self._levels, self._goals.tolist(), goals is not None)
@@ -191,4 +199,4 @@ def _tables(arm: Arm) -> Arena:
     return firm_grips(arena)
 
 
-OWN = Own(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")
+DEFAULTS = Defaults(_tables, training_ranges, "table2", marks=goals_.add_disc, does="carry")

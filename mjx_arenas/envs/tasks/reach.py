@@ -13,7 +13,7 @@ from mjx_arenas.envs.arms.moves import HEIGHTS
 from mjx_arenas.envs.arms.report import HEADINGS
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals, manipulation
-from mjx_arenas.envs.tasks.manipulation import ArmTask, Given, Own
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Defaults, Given
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import dot
@@ -72,7 +72,7 @@ class Reach(ArmTask):
         config_overrides: Mapping[str, Any] | None = None,
         **given: Unpack[Given],
     ) -> None:
-        super().__init__(OWN, config or default_config(), config_overrides, **given)
+        super().__init__(DEFAULTS, config or default_config(), config_overrides, **given)
 
     def draw_task(self, key: jax.Array, params: ArenaParams, qpos: jax.Array) -> Point:
         (near, far), rise = self.arm.reach, self.arm.rise
@@ -100,7 +100,7 @@ class Reach(ArmTask):
         return reward, jnp.zeros((), bool), {"success": success, "distance": distance}
 
 
-OWN = Own(
+DEFAULTS = Defaults(
     lambda _: TableArena((0.9, 0.9, 0.05)),
     training_ranges,
     0,
