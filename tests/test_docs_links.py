@@ -76,6 +76,7 @@ def test_commands_parse(tmp_path, monkeypatch):
     for name in ("arena", "first"):
         (tmp_path / f"{name}.yaml").write_text(command.SMALL)
     (tmp_path / "lift_ur5e.yaml").write_text("task: lift")
+    (tmp_path / "few_worlds.yaml").write_text("task: pick_and_place")
     (tmp_path / "docs").mkdir()
     seen = set()
     for page in pages.PAGES:

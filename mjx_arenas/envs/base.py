@@ -181,18 +181,15 @@ class ArenaEnv(mjx_env.MjxEnv):
         if self._eyes is not None:
             info |= {"drawn_steps": jnp.zeros((), jnp.int32), "unseen": false}
             obs |= self._eyes.first(self._now(model, data, episode))
-        metrics = {**_REPORTS, **metrics}
-        zeros = jax.tree.map(lambda x: jnp.zeros((), jnp.float32), metrics)
+        zeros = dict.fromkeys({**_REPORTS, **metrics}, jnp.zeros((), jnp.float32))
         return State(data, obs, jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
     def step(self, state: State, action: jax.Array) -> State:
         """Takes one control step; vmap. Actions are clipped to [-1, 1]. One that is not finite counts as none and ends the episode."""
-        refusals.check_state(state)
-        refusals.check_action(action, self.action_size)
+        refusals.check_step(state, action, self.action_size)
         info, data = dict(state.info), state.data
         begins = self.begins(state)
-        level_step: Any = self._config.level_step
-        moved = jnp.where(info["succeeded"], 1.0, -1.0) * level_step
+        moved = jnp.where(info["succeeded"], 1.0, -1.0) * float(self._config["level_step"])
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
@@ -342,11 +339,7 @@ class ArenaEnv(mjx_env.MjxEnv):
 
         otherwise = info["next_episode"], info["rng"]
         args = self._mjx_model, info["rng"], info["level"], info["episode"].params
-        try:
-            (upcoming, rng), drawn = when_needed(draw, ~info["ready"], begins, otherwise, *args)
-        except TypeError:
-            refusals.check_alike(jax.eval_shape(draw, *args)[0], info["next_episode"])
-            raise
+        (upcoming, rng), drawn = when_needed(draw, ~info["ready"], begins, otherwise, *args)
         return upcoming, rng, info["ready"] | drawn
 
     def _started(self, data: mjx.Data, episode: Episode, begins: jax.Array) -> mjx.Data:

@@ -196,21 +196,11 @@ def check_privileged(method: str, given: Any) -> None:
         raise error([problem(method, "gives", None, Told(got), must="a dict with 'privileged_state' for `vision`")])
 
 
-def check_state(state: Any) -> None:
-    """Raises where a state is none, or is of many worlds."""
+def check_step(state: Any, action: Any, size: int) -> None:
+    """Raises where a state is none, or is of many worlds, or an action is no array, has another size, or is of many worlds."""
     check_type("state", state, State, "a State, as reset and step give it")
     if jnp.ndim(state.done):
         raise error([problem("state", "one_world", of=f"{len(state.done)} worlds", instead="use jax.vmap")])
-
-
-def check_alike(drawn: Any, given: Any) -> None:
-    """Raises where the episodes of a state are not like those that the environment draws."""
-    if jax.tree.map(jnp.shape, drawn) != jax.tree.map(jnp.shape, given):
-        raise error([problem("state", "state_of_another")])
-
-
-def check_action(action: Any, size: int) -> None:
-    """Raises where an action is no array, has another size, or is of many worlds."""
     check_type("action", action, (jax.Array, np.ndarray), f"an array ({size},)")
     if jnp.shape(action) != (size,):
         shape = jnp.shape(action)
@@ -218,6 +208,12 @@ def check_action(action: Any, size: int) -> None:
             raise error([problem("action", "n_actions", None, len(action), n=size, s="s" * (size != 1))])
         told = {"of": f"shape {shape} instead of ({size},)", "instead": "use jax.vmap"}
         raise error([problem("action", "one_world", None, None, told)])
+
+
+def check_alike(drawn: Any, given: Any) -> None:
+    """Raises where what a state has of its next episode is not like what the environment draws."""
+    if jax.tree.map(jnp.shape, drawn) != jax.tree.map(jnp.shape, given):
+        raise error([problem("state", "state_of_another")])
 
 
 def check_task(method: str, task: Any) -> None:

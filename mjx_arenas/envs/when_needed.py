@@ -6,6 +6,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from mjx_arenas.envs import refusals
+
 _PENDING = 4  # the work waits until one in so many worlds wants it
 _CHUNK = 4  # and is done for one in so many worlds at once
 
@@ -33,7 +35,11 @@ def when_needed(
     @jax.custom_batching.custom_vmap
     def one(wanted: jax.Array, urgent: jax.Array, otherwise: Any, args: tuple) -> tuple[Any, jax.Array]:
         del urgent
-        return jax.lax.cond(wanted, lambda: function(*args), lambda: otherwise), wanted
+        try:
+            return jax.lax.cond(wanted, lambda: function(*args), lambda: otherwise), wanted
+        except TypeError:
+            refusals.check_alike(jax.eval_shape(function, *args), otherwise)
+            raise
 
     @one.def_vmap
     def many(n: int, batched: Any, wanted: jax.Array, urgent: jax.Array, otherwise: Any, args: tuple) -> tuple:

@@ -206,11 +206,7 @@ class ArmTask(ArenaEnv):
         check_known(type(self).__name__, [*dict.fromkeys([*own_names, *Given.__annotations__])], given)
         known.check_config(config)
         chosen: Any = chosen_config(config, config_overrides or {}, list(default_config()))
-        if chosen.action not in ("cartesian", "joint"):
-            raise error([problem("config.action", "must", None, chosen.action, must="'cartesian' or 'joint'")])
-        if not (is_number(chosen.action_scale) and 0 < chosen.action_scale <= MOST_SCALE):
-            must = f"a number > 0 and <= {MOST_SCALE}, with which a step is {MOST_SCALE * STEP} m"
-            raise error([problem("config.action_scale", "must", None, chosen.action_scale, must=must)])
+        _check(chosen)
         arm, arena = given.get("arm"), given.get("arena")
         arm, ranges, vision = known.small() if arm is None else arm, given.get("ranges"), given.get("vision")
         self._chain = moves.checked(arm)
@@ -272,8 +268,7 @@ class ArmTask(ArenaEnv):
     def step(self, state: State, action: jax.Array) -> State:
         if self.flaws is None:
             return super().step(state, action)
-        refusals.check_state(state)
-        refusals.check_action(action, self.action_size)
+        refusals.check_step(state, action, self.action_size)
         begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
         late, action = self.flaws.act(late, action, begins, state.info["episode"], self._steps(state))
         # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.
@@ -383,6 +378,15 @@ class ArmTask(ArenaEnv):
         is_open, told = grips.opened(hand.grip, grip.ends), grips.opened(ctrl[grip.ids], grip.controls)
         ahead = [ctrl[self._servo] - hand.q, told - is_open]
         return jnp.concatenate([hand.q, 0.1 * hand.velocity, is_open, *ahead, tool.pos, tool.mat[:2, 0]])
+
+
+def _check(config: Any) -> None:
+    """Raises where what a configuration says of actions makes no sense."""
+    if config.action not in ("cartesian", "joint"):
+        raise error([problem("config.action", "must", None, config.action, must="'cartesian' or 'joint'")])
+    if not (is_number(config.action_scale) and 0 < config.action_scale <= MOST_SCALE):
+        must = f"a number > 0 and <= {MOST_SCALE}, with which a step is {MOST_SCALE * STEP} m"
+        raise error([problem("config.action_scale", "must", None, config.action_scale, must=must)])
 
 
 def gripped(distance: jax.Array, action: jax.Array) -> jax.Array:
