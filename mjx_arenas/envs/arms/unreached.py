@@ -15,7 +15,7 @@ from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, each, on_host
 from mjx_arenas.problem import numbered, problem
 from mjx_arenas.problems.messages import warn
-from mjx_arenas.sample import placement, tops
+from mjx_arenas.sample import tops
 from mjx_arenas.sample.fixed import points
 from mjx_arenas.sample.sampling import world_keys
 from mjx_arenas.spec.place import Place
@@ -195,7 +195,7 @@ def _level(
     corners = np.array([(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])])
     corners = below.top[:2] + geometry.rotate_yaw(below.rot, corners)
     there = (corners.min(0) <= reach + SLACK).all() and (corners.max(0) >= -reach - SLACK).all()
-    lies, stands = _origins(arena, params, float(below.top[2]))
+    lies, stands = _middles(params, float(below.top[2]))
     reached = there and lies <= heights[1] + SLACK and stands >= heights[0] - SLACK
     return Level(surface, float(below.top[2]), bool(reached))
 
@@ -209,14 +209,10 @@ def _places(arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> 
     return below, low, high
 
 
-def _origins(arena: Arena, params: ArenaParams, up: float) -> tuple[float, float]:
-    """The least and the greatest height of the first object's origin on a surface at this height [m].
-
-    The object may lie on any of its sides, and its origin may be outside of it.
-    """
+def _middles(params: ArenaParams, up: float) -> tuple[float, float]:
+    """The least and the greatest height of the first object's middle on a surface at this height [m]; it may lie on any of its sides."""
     size = np.asarray(params.object_full_sizes[0])
-    off = float(np.linalg.norm(placement.lies(arena.layout.places, params).center[0]))
-    return up + float(size.min()) / 2 - off, up + float(size.max()) / 2 + off
+    return up + float(size.min()) / 2, up + float(size.max()) / 2
 
 
 def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: Wanted) -> Away:
@@ -235,7 +231,7 @@ def _away(foot: Foot, arena: Arena, params: ArenaParams, surface: int, wanted: W
     there = least <= most
     distances = np.linspace(least, most, _TRIED) if there else foot.heights.distances
     low, high = (np.interp(distances, foot.heights.distances, x) for x in (foot.heights.low, foot.heights.high))
-    lies, stands = _origins(arena, params, up)
+    lies, stands = _middles(params, up)
     reached = there & (low - SLACK <= stands) & (lies + wanted.lift <= high + SLACK)
     near, far = (
         (near, far) if near <= far else told

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas import geometry
+from mjx_arenas import geometry, quaternions
 from mjx_arenas.arena import Arena
 from mjx_arenas.furniture.surfaces import Surfaces
 from mjx_arenas.keywords import nearest
@@ -17,7 +17,7 @@ from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error
-from mjx_arenas.sample import tops
+from mjx_arenas.sample import placement, tops
 
 GOAL_RADIUS = 0.05  # [m] of success
 _NAME = "goal"
@@ -45,6 +45,13 @@ def marked(arena: Arena, data: mjx.Data, pos: jax.Array) -> mjx.Data:
     """The data with what shows the goal at a place (3,) [m]; other mocap bodies stay."""
     row = int(arena.mj_model.body(_NAME).mocapid[0])
     return data.replace(mocap_pos=data.mocap_pos.at[row].set(pos))
+
+
+def middle(arena: Arena, params: ArenaParams, qpos: jax.Array) -> jax.Array:
+    """(3,) middle of the first object where it is at `qpos` (nq,), in the world [m]; its origin may be elsewhere."""
+    at = arena.layout.object_qpos[0]
+    center = jnp.asarray(placement.body_centers(arena.layout.places, params)[0], qpos.dtype)
+    return qpos[at[:3]] + quaternions.quat_rotate(quaternions.normalize(qpos[at[3:]]), center)
 
 
 def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarray:

@@ -20,7 +20,7 @@ from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.config import chosen_config, env_config
-from mjx_arenas.envs.tasks import looks
+from mjx_arenas.envs.tasks import goals, looks
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -28,7 +28,6 @@ from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.rows import dot
 from mjx_arenas.rules.validation import error, is_number, raise_all, vector_problems
-from mjx_arenas.sample import placement
 from mjx_arenas.spec import names, specs
 
 STEP = 0.025  # [m] that an action moves the tool at most, along each axis
@@ -214,10 +213,8 @@ class ArmTask(ArenaEnv):
         if self._holds and not arm.fingers:
             raise error([problem("arm.fingers", "fingers_to", None, dict(arm.fingers), does=defaults.does)])
         moves.check_keyframe(arm, chosen.keyframe)
-        on, pos, usual = (
-            (defaults.on, defaults.pos, defaults.ranges) if arena is None else (None, (0.0, 0.0, 0.0), ArenaRanges)
-        )
-        on, pos = given.get("on", on), given.get("pos", pos)
+        usual = defaults if arena is None else defaults._replace(ranges=ArenaRanges, on=None, pos=(0.0, 0.0, 0.0))
+        on, pos = given.get("on", usual.on), given.get("pos", usual.pos)
         raise_all(vector_problems("pos", pos, 3, "[m]"), "`pos`")
         x, y, z = pos
         arena, sees = defaults.arena(arm) if arena is None else arena, vision is not None or chosen.vision
@@ -227,7 +224,7 @@ class ArmTask(ArenaEnv):
         if sees:
             looks.check(arena, arm.spec, arm.tool)
         if ranges is None:
-            ranges = looks.with_looks(usual(), len(arena.objects), wrist=True) if sees else usual()
+            ranges = looks.with_looks(usual.ranges(), len(arena.objects), wrist=True) if sees else usual.ranges()
         self._scale: float = chosen.action_scale
         arena.attach(arm.spec, prefix=PREFIX, pos=(x, y, z + arm.rise), on=on, keyframe=chosen.keyframe)
         defaults.marks(arena.spec)
@@ -350,9 +347,7 @@ class ArmTask(ArenaEnv):
 
     def middle(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
         """(3,) middle of the first object where it is at `qpos` (nq,), in the world [m]; its origin may be elsewhere."""
-        at = self.arena.layout.object_qpos[0]
-        center = jnp.asarray(placement.body_centers(self.arena.layout.places, params)[0], qpos.dtype)
-        return qpos[at[:3]] + quaternions.quat_rotate(quaternions.normalize(qpos[at[3:]]), center)
+        return goals.middle(self.arena, params, qpos)
 
     def thing(self, data: mjx.Data, episode: Episode) -> tuple[jax.Array, jax.Array]:
         """(3,) position of the middle [m] and (3, 3) orientation of the first object in the frame of the arm's base."""

@@ -111,7 +111,7 @@ class Push(ToGoal):
         return PushedTo(goal_at(table, spots[first]), params.object_active[0])
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        tip, tip_velocity, box, yaw, velocity = self.look(data)
+        tip, tip_velocity, box, yaw, velocity = self.look(data, episode.params)
         goal, p = episode.task.pos, episode.params
         # The heights of box and goal stay out: until it falls, a box's hardly changes on one table, and Brax divides by its spread.
         state = jnp.concatenate([tip, tip_velocity, box - tip, turn(yaw), velocity[:2], (goal - box)[:2]])
@@ -119,14 +119,14 @@ class Push(ToGoal):
         privileged = jnp.concatenate([state, *table, p.object_full_sizes[0, :1], p.object_masses])
         return {"state": state, "privileged_state": privileged}
 
-    def proprioception(self, data: mjx.Data) -> jax.Array:
-        tip, velocity, *_ = self.look(data)
+    def proprioception(self, data: mjx.Data, episode: Episode) -> jax.Array:
+        tip, velocity, *_ = self.look(data, episode.params)
         return jnp.concatenate([tip, velocity])
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        tip, _, box, _, velocity = self.look(data)
+        tip, _, box, _, velocity = self.look(data, episode.params)
         to_goal = episode.task.pos[:2] - box[:2]
         distance = jnp.sqrt((to_goal**2).sum() + 1e-12)
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)

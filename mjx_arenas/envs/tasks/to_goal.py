@@ -25,7 +25,7 @@ class Seen(NamedTuple):
 
     tip: jax.Array  # (3,)
     tip_velocity: jax.Array  # (3,)
-    box: jax.Array  # (3,)
+    box: jax.Array  # (3,) its middle
     yaw: jax.Array  # () of the box [rad]
     velocity: jax.Array  # (3,) of the box
 
@@ -71,14 +71,14 @@ class ToGoal(ArenaEnv):
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         return goals.marked(self.arena, data, episode.task.pos)
 
-    def look(self, data: mjx.Data) -> Seen:
+    def look(self, data: mjx.Data, params: ArenaParams) -> Seen:
         """The places and velocities of the robot's tip and of the box."""
         qpos, qvel, at = data.qpos, data.qvel, self._box_velocity
         tip = jnp.stack([qpos[j.qposadr[0]] for j in self._slides]) + jnp.array([0, 0, robots.TIP_HEIGHT])
         tip_velocity = jnp.stack([qvel[j.dofadr[0]] for j in self._slides])
         w, x, y, z = (qpos[i] for i in self._box[3:])
         yaw = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
-        return Seen(tip, tip_velocity, qpos[self._box[:3]], yaw, qvel[at : at + 3])
+        return Seen(tip, tip_velocity, goals.middle(self.arena, params, qpos), yaw, qvel[at : at + 3])
 
 
 def _check_alone(spec: mujoco.MjSpec) -> None:

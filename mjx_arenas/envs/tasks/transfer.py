@@ -53,7 +53,7 @@ class GoalOn(NamedTuple):
     """The place where the box is to go, and what is below it."""
 
     pos: jax.Array  # (3,) on the surface, in the world [m]
-    above: jax.Array  # () from a surface to the box's origin when it stands there [m]
+    above: jax.Array  # () from a surface to the box's middle when it stands there [m]
     below: Surfaces
     frictions: jax.Array  # (2,) of what carries the box at first, and of this
     possible: jax.Array
@@ -99,7 +99,7 @@ class Transfer(ToGoal):
         goals: a name or names of `arena.surfaces` that are not objects. Each episode draws one that is there and does not carry the box.
             None: the second of them, which is the second table, or where there is but one table a surface of furniture.
         reach: reach of the gripper along x and y, to each side of the middle of the floor [m]. Its tip reaches heights from 0.45 to 1.45 m,
-            between which the box's origin must be.
+            between which the box's middle must be.
 
     Raises:
         ValueError: the arena's first object is not "box", or is there in no world, the arena has actuators, a name in `goals` is not one
@@ -142,7 +142,7 @@ class Transfer(ToGoal):
         which, where = jax.random.split(key)
         other = goals_.other_surface(which, self.arena, params, self._goals)
         goal = goal_at(other.surface, spot(where, other.surface, jnp.minimum(_MARGIN, other.surface.size.min() / 4)))
-        box, start = qpos[self._box[:3]], self.surface(params, params.object_tables[0])
+        box, start = goals_.middle(self.arena, params, qpos), self.surface(params, params.object_tables[0])
         above = box[2] - start.top[2]
         places = jnp.stack([goal.at[2].add(above), box])
         low, high = robots.TIP_HEIGHTS
@@ -152,7 +152,7 @@ class Transfer(ToGoal):
         return GoalOn(goal, above, other.surface, other.frictions, possible)
 
     def observe(self, data: mjx.Data, episode: Episode) -> dict[str, jax.Array]:
-        tip, tip_velocity, box, yaw, velocity = self.look(data)
+        tip, tip_velocity, box, yaw, velocity = self.look(data, episode.params)
         goal, p = episode.task.pos, episode.params
         fingers = jnp.stack([data.qpos[i] for i in self._fingers]) / robots.STROKE
         hand = [tip, tip_velocity, fingers, turn(yaw - data.qpos[self._yaw])]
@@ -165,7 +165,7 @@ class Transfer(ToGoal):
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array
     ) -> tuple[jax.Array, jax.Array, dict[str, jax.Array]]:
-        tip, _, box, _, velocity = self.look(data)
+        tip, _, box, _, velocity = self.look(data, episode.params)
         goal, start = episode.task.pos, self.surface(episode.params, episode.params.object_tables[0]).top[2]
         tops = jnp.stack([start, goal[2]])
         reach = jnp.sqrt(((tip - box) ** 2).sum() + 1e-12)
