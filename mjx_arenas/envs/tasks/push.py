@@ -119,9 +119,8 @@ class Push(ToGoal):
         privileged = jnp.concatenate([state, *table, p.object_full_sizes[0, :1], p.object_masses])
         return {"state": state, "privileged_state": privileged}
 
-    def proprioception(self, data: mjx.Data, episode: Episode) -> jax.Array:
-        tip, velocity, *_ = self.look(data, episode.params)
-        return jnp.concatenate([tip, velocity])
+    def proprioception(self, data: mjx.Data) -> jax.Array:
+        return jnp.concatenate(self.tip(data))
 
     def score(
         self, data: mjx.Data, episode: Episode, action: jax.Array

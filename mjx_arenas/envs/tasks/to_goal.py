@@ -71,14 +71,16 @@ class ToGoal(ArenaEnv):
     def mark(self, data: mjx.Data, episode: Episode) -> mjx.Data:
         return goals.marked(self.arena, data, episode.task.pos)
 
+    def tip(self, data: mjx.Data) -> tuple[jax.Array, jax.Array]:
+        """(3,) place of the robot's tip in the world [m], and its velocity [m/s]."""
+        place = jnp.stack([data.qpos[j.qposadr[0]] for j in self._slides]) + jnp.array([0, 0, robots.TIP_HEIGHT])
+        return place, jnp.stack([data.qvel[j.dofadr[0]] for j in self._slides])
+
     def look(self, data: mjx.Data, params: ArenaParams) -> Seen:
         """The places and velocities of the robot's tip and of the box."""
-        qpos, qvel, at = data.qpos, data.qvel, self._box_velocity
-        tip = jnp.stack([qpos[j.qposadr[0]] for j in self._slides]) + jnp.array([0, 0, robots.TIP_HEIGHT])
-        tip_velocity = jnp.stack([qvel[j.dofadr[0]] for j in self._slides])
-        w, x, y, z = (qpos[i] for i in self._box[3:])
-        yaw = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
-        return Seen(tip, tip_velocity, goals.middle(self.arena, params, qpos), yaw, qvel[at : at + 3])
+        w, x, y, z = (data.qpos[i] for i in self._box[3:])
+        yaw, at = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)), self._box_velocity
+        return Seen(*self.tip(data), goals.middle(self.arena, params, data.qpos), yaw, data.qvel[at : at + 3])
 
 
 def _check_alone(spec: mujoco.MjSpec) -> None:
