@@ -37,6 +37,10 @@ class Killed(Exception):
     pass
 
 
+STAGES = {stages.seed_of(0, stage, rounds): stage for stage in range(3) for rounds in range(20)}
+"""The stage of a seed."""
+
+
 @pytest.fixture
 def brax(monkeypatch):
     """In the place of Brax's PPO: saves after every ten steps, and is killed where it is told to be."""
@@ -44,7 +48,7 @@ def brax(monkeypatch):
 
     def learn(env, config, report, left, seed, save_checkpoint_path, restore_checkpoint_path):
         steps, evals = left
-        stage, first = seed % 1000, 5 - evals
+        stage, first = STAGES[seed], 5 - evals
         path = restore_checkpoint_path and pathlib.Path(restore_checkpoint_path)
         calls.append((stage, steps, evals, path and (path / "at").read_text()))
         for i in range(evals):

@@ -294,11 +294,12 @@ def test_best(tmp_path, monkeypatch):
 
     def learn(env, config, report, left, seed, save_checkpoint_path, restore_checkpoint_path):
         restored.append(restore_checkpoint_path and (pathlib.Path(restore_checkpoint_path) / "at").read_text())
-        for step, share in enumerate(shares[seed]):
+        stage = [stages.seed_of(0, number, 0) for number in range(3)].index(seed)
+        for step, share in enumerate(shares[stage]):
             if step:  # PPO's first policy is judged, and not saved
                 folder = pathlib.Path(save_checkpoint_path) / f"{step:012d}"
                 folder.mkdir(parents=True)
-                (folder / "at").write_text(f"{seed} {step}")
+                (folder / "at").write_text(f"{stage} {step}")
             report(step, {"eval/episode_reward": 1.0, "eval/episode_success_at_end": share})
 
     monkeypatch.setattr(stages, "ppo", learn)
@@ -412,7 +413,7 @@ def test_success():
         _config = types.SimpleNamespace(episode_length=3)
 
         def reset(self, key):
-            names = ("success", "nan_state", "invalid_arena", "dropped_contacts", "solver_limits")
+            names = ("success", "nan_state", "nan_action", "invalid_arena", "dropped_contacts", "solver_limits")
             metrics = dict.fromkeys(names, 0.0)
             return State(None, jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), metrics, {"t": 0, "episode": tried(0)})
 
