@@ -308,6 +308,8 @@ def _number_problem(part: str, numbers: Mapping[str, Any]) -> "Problem | None":
             kind, low = "a whole number" if whole else "a number", f"{'>=' if also else '>'} {least:g}"
             return _must(f"{part}.{name}", f"{kind} {low}{'' if math.isinf(most) else f' and <= {most:g}'}", value)
     for name, value in numbers.get("network_factory", {}).items():
+        if name.endswith("_obs_key") and not isinstance(value, str):
+            return _must(f"{part}.network_factory.{name}", "the name of an observation", value)
         sizes = value if isinstance(value, (list, tuple)) else ()
         if not all(isinstance(size, int) and not isinstance(size, bool) and size >= 1 for size in sizes):
             return _must(f"{part}.network_factory.{name}", "whole numbers >= 1", value)

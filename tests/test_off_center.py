@@ -14,7 +14,7 @@ import mjx_arenas as mja
 from mjx_arenas import quaternions
 from mjx_arenas.envs import Lift, PickAndPlace, Transfer
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks import goals, manipulation
 from mjx_arenas.sim.data import blank
 
 SIDES, FRICTION, MASS = np.array([0.04, 0.05, 0.06]), [0.8, 0.005, 0.0001], 0.1
@@ -92,6 +92,22 @@ def tool_at_home(kind):
     mujoco.mj_resetDataKeyframe(env.mj_model, data, env.mj_model.key(env.keyframe).id)
     mujoco.mj_kinematics(env.mj_model, data)
     return data.site(manipulation.PREFIX + env.arm.tool).xpos.copy()
+
+
+@pytest.mark.parametrize("where", KINDS)
+def test_velocity_of_the_middle(where):
+    """That of its geom in C MuJoCo, while it turns and flies."""
+    env = made(Lift, where)
+    data, row = mujoco.MjData(env.mj_model), env.arena.layout.object_qpos[0]
+    joint = env.mj_model.joint(env.arena.objects[0].joint).dofadr[0]
+    data.qpos[row[3:]] = np.array([0.5, -0.1, 0.7, 0.3]) / np.sqrt(0.84)
+    data.qvel[joint : joint + 6] = [0.1, -0.2, 0.3, 1.0, -2.0, 3.0]
+    mujoco.mj_forward(env.mj_model, data)
+    geom, want = env.mj_model.body("box").geomadr[0], np.zeros(6)
+    mujoco.mj_objectVelocity(env.mj_model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, want, 0)
+    seen = blank(env.mj_model).replace(qpos=jnp.asarray(data.qpos), qvel=jnp.asarray(data.qvel))
+    found = goals.middle_velocity(env.arena, env.arena.nominal_params(), seen)
+    np.testing.assert_allclose(found, want[3:], atol=1e-6)
 
 
 @pytest.mark.parametrize("where", KINDS)

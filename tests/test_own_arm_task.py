@@ -1,7 +1,10 @@
 """The task of docs/how_to/own_arm_task.md: it goes by the middle of the box, in the arm's frame, and is trained from its file."""
 
+import importlib.util
+
 import jax
 import jax.numpy as jnp
+import models
 import mujoco
 import numpy as np
 import pages
@@ -9,9 +12,12 @@ import pytest
 
 pytest.importorskip("mujoco_playground")
 
+import mjx_arenas as mja
 from mjx_arenas import settings
+from mjx_arenas.envs import ArmTask
 from mjx_arenas.envs.base import Episode
-from mjx_arenas.envs.tasks import configured
+from mjx_arenas.envs.tasks import configured, manipulation
+from mjx_arenas.envs.tasks.defaults import Defaults
 from mjx_arenas.sim.data import blank
 
 PAGE = "docs/how_to/own_arm_task.md"
@@ -77,3 +83,121 @@ def test_it_is_trained_from_its_file(push_aside):
         ),
     )
     assert state.reward.shape == (2,)
+
+
+def test_other_arms(tmp_path, monkeypatch):
+    """Each has a base of its own name."""
+    monkeypatch.syspath_prepend(models.ROBOTS)  # where the tests have robots' packages
+    if importlib.util.find_spec("mjlab") is None:
+        pytest.skip("needs mjlab")
+    (tmp_path / "push_aside.py").write_text(pages.blocks(PAGE)[0][0])
+    monkeypatch.syspath_prepend(tmp_path)
+    config = {
+        "task": "push_aside:PushAside",
+        "impl": "warp",
+        "sees": "numbers",
+        "env": {"arm": "yam", "robot_strength": 1.0},
+    }
+    assert configured.environment(config).arm.base == "arm"
+
+
+class Still(ArmTask):
+    """Does nothing with what it is given."""
+
+    own = Defaults(lambda arm: mja.TableArena((0.9, 0.9, 0.05)), mja.ArenaRanges, pos=(-0.3, 0, 0))
+
+    def __init__(self, defaults=None):
+        super().__init__(defaults or self.own, manipulation.default_config(), {"impl": "warp"})
+
+    def draw_task(self, key, params, qpos):
+        return {}
+
+    def observe(self, data, episode):
+        return {"state": self.proprioception(data, episode)}
+
+    def score(self, data, episode, action):
+        return jnp.zeros(()), jnp.zeros((), bool), {"success": 0.0}
+
+
+class Takes(Still):
+    def draw_task(self, key, params, qpos):
+        return {"possible": self.takes(params, qpos)}
+
+
+class Middles(Still):
+    def draw_task(self, key, params, qpos):
+        return {"place": self.middle(params, qpos)}
+
+
+class Few(Still):
+    action_size = 3
+
+
+class Possible(Still):
+    def draw_task(self, key, params, qpos):
+        return {"possible": jnp.zeros((), bool)}
+
+
+class Sees(Still):
+    sees: object = None
+
+    def observe(self, data, episode):
+        return {"state": self.sees}
+
+
+def changed(**given):
+    return lambda: Still(Still.own._replace(**given))
+
+
+def of(kind, **attributes):
+    """Traces a start and a step of a task."""
+
+    def trace():
+        env = type(kind.__name__, (kind,), attributes)()
+        state = jax.eval_shape(env.reset, jax.random.key(0))
+        jax.eval_shape(env.step, state, jnp.zeros(env.action_size))
+
+    return trace
+
+
+NUMBERS = "`Sees.observe` must give numbers (n,) as 'state', got "
+WRONG = {
+    "an arena": (
+        changed(arena=mja.TableArena()),
+        "`defaults.arena` must be a function of (arm), got TableArena.",
+    ),
+    "no argument": (changed(arena=lambda: None), "`defaults.arena` must be a function of (arm), got one of ()."),
+    "ranges": (changed(ranges=mja.ArenaRanges()), "`defaults.ranges` must be a function of (), got ArenaRanges."),
+    "no marks": (changed(marks=None), "`defaults.marks` must be a function of (spec), got NoneType."),
+    "no verb": (changed(does=None), '`defaults.does` must be a verb such as "lift", or "", got NoneType.'),
+    "a word": (changed(grips="no"), "`defaults.grips` must be True or False, got str."),
+    "no defaults": (
+        lambda: Still({"on": 0}),
+        "`defaults` must be Defaults(...), what the task has of its own, got dict.",
+    ),
+    "takes": (
+        of(Takes),
+        "`Takes.takes` is about the arena's first object: say what the task does to it, `Defaults(does=...)`.",
+    ),
+    "middle": (of(Middles), "`Middles.middle` is about the arena's first object: say what the task does to it, "),
+    "other actions": (
+        of(Few),
+        "`Few.drive` must be defined where `action_size` is: it makes controls of these actions.",
+    ),
+    "possible in a dict": (
+        of(Possible),
+        "`Possible.draw_task` must give `possible` as an attribute, such as a field of a NamedTuple, got a dict with it.",
+    ),
+    "a tuple": (of(Sees, sees=(jnp.zeros(3), jnp.zeros(3))), NUMBERS + "tuple."),
+    "one number": (of(Sees, sees=jnp.zeros(())), NUMBERS + "float32."),
+    "no number": (of(Sees, sees=jnp.zeros(0)), NUMBERS + "float32 of shape (0,)."),
+    "whole numbers": (of(Sees, sees=jnp.zeros(3, int)), NUMBERS + "int32 of shape (3,)."),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong(case):
+    make, says = WRONG[case]
+    with pytest.raises((ValueError, TypeError)) as raised:
+        make()
+    assert str(raised.value).startswith(says), raised.value

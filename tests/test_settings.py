@@ -87,6 +87,10 @@ WRONG = {
         ["--set", "ppo.network_factory.value_obs_key=nothing"],
         "`ppo.network_factory.value_obs_key` must be one of the observations 'privileged_state', 'state', got 'nothing'.",
     ),
+    "a list of observations": (
+        ["--set", "ppo.network_factory.value_obs_key=[state, foo]"],
+        "`ppo.network_factory.value_obs_key` must be the name of an observation, got ['state', 'foo'].",
+    ),
     "half a world": (["--set", "ppo.batch_size=2.5"], "`ppo.batch_size` must be a whole number >= 1, got 2.5."),
     "no neurons": (
         ["--set", "ppo.network_factory.policy_hidden_layer_sizes=[32, 0]"],

@@ -184,6 +184,15 @@ def check_observation(method: str, given: Any, sees: bool = False) -> None:
     if isinstance(given, Mapping) and "state" not in given and not sees:
         got = quoted(list(given)) or "none"
         raise error([problem(method, "gives", None, Told(got), must="'state' among its observations")])
+    for name, value in given.items() if isinstance(given, Mapping) else ():
+        if (
+            not isinstance(value, jax.Array)
+            or not value.ndim
+            or not value.size
+            or not jnp.issubdtype(value.dtype, jnp.floating)
+        ):
+            got = _array(value) if isinstance(value, jax.Array) else kind_of(value)
+            raise error([problem(method, "gives", None, Told(got), must=f"numbers (n,) as {name!r}")])
     if not isinstance(given, (Mapping, jax.Array)):
         must = "a dict of arrays, 'state' and 'privileged_state', or one array"
         raise error([problem(method, "gives", None, Told(type(given).__name__), must=must)])
@@ -223,6 +232,9 @@ def check_task(method: str, task: Any) -> None:
     ]
     if wrong:
         raise error([problem(method, "tree_of_arrays", None, Told(type(wrong[0]).__name__))])
+    if isinstance(task, Mapping) and "possible" in task:
+        must = "`possible` as an attribute, such as a field of a NamedTuple"
+        raise error([problem(method, "gives", None, Told("a dict with it"), must=must)])
     possible = jnp.asarray(getattr(task, "possible", True))
     if possible.shape or possible.dtype != bool:
         raise error([problem(method, "gives", None, Told(_array(possible)), must="one bool as `possible`")])
@@ -243,6 +255,12 @@ def check_default_control(method: str, shape: tuple[int, ...], mj_model: mujoco.
         if not mj_model.actuator_ctrllimited[i]:
             name = mj_model.actuator(i).name or i
             raise error([problem(method, "control_unlimited", None, name)])
+
+
+def check_drive(env: Any, base: Any) -> None:
+    """Raises where a task has other actions than its `base`, and leaves it to the base to drive by them."""
+    if type(env).action_size is not base.action_size and type(env).drive is base.drive:
+        raise error([problem(f"{type(env).__name__}.drive", "drive_defined")])
 
 
 def check_control(env: Any, base: Any, control: Any) -> None:

@@ -88,6 +88,8 @@ IN_ENVS = {
     "task_of_file": "{file}: {at} must be one of {known}, or module:function, got {got}.",
     "setting_unknown": "{file}: {at} is not known: here are {known}.",
     "setting_meant": "{file}: {at} is not known: did you mean `{close}`?",
+    "drive_defined": "{at} must be defined where `action_size` is: it makes controls of these actions.",
+    "needs_does": "{at} is about the arena's first object: say what the task does to it, `Defaults(does=...)`.",
     "arena_taken": "{at} is compiled already, or is another task's, so that {what} cannot be put into it: make one for each task.",
     "state_of_another": "{at} is of another environment, whose episodes have other numbers.",
     "setting_of_files": "{file}: {at} is a part of files alone: set {instead} itself.",

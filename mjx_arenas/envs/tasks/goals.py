@@ -54,6 +54,14 @@ def middle(arena: Arena, params: ArenaParams, qpos: jax.Array) -> jax.Array:
     return qpos[at[:3]] + quaternions.quat_rotate(quaternions.normalize(qpos[at[3:]]), center)
 
 
+def middle_velocity(arena: Arena, params: ArenaParams, data: mjx.Data) -> jax.Array:
+    """(3,) velocity of the middle of the first object in the world [m/s]; its joint turns in its own frame, about its origin."""
+    v = arena.mj_model.joint(arena.objects[0].joint).dofadr[0]
+    center = jnp.asarray(placement.body_centers(arena.layout.places, params)[0], data.qvel.dtype)
+    quat = quaternions.normalize(data.qpos[arena.layout.object_qpos[0, 3:]])
+    return data.qvel[v : v + 3] + quaternions.quat_rotate(quat, jnp.cross(data.qvel[v + 3 : v + 6], center))
+
+
 def surface_indices(arena: Arena, goals: str | Sequence[str] | None) -> np.ndarray:
     """(G,) of the tables and surfaces of this name or these names, which are no objects; None: of the second.
 

@@ -14,11 +14,11 @@ from mjx_arenas.envs.arms import unreached
 from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks.defaults import Defaults
 from mjx_arenas.envs.tasks.goals import friction_on
 from mjx_arenas.envs.tasks.manipulation import (
     TABLES_DECIDE,
     ArmTask,
-    Defaults,
     Given,
     firm_grips,
     gripped,
@@ -110,7 +110,11 @@ class Lift(ArmTask):
         tool = self.hand(data, episode).tool.pos
         state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1]])
         params = episode.params
-        more = [self.thing_velocity(data), *thing_numbers(params), friction_on(params, params.object_tables[0])]
+        more = [
+            self.thing_velocity(data, episode),
+            *thing_numbers(params),
+            friction_on(params, params.object_tables[0]),
+        ]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
 
     def score(

@@ -1,7 +1,7 @@
 """What tasks of arms share: how actions move them, and what policies know of themselves."""
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypedDict, Unpack
 
 import jax
@@ -20,7 +20,9 @@ from mjx_arenas.envs.arms.arm import HOME, Arm
 from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.base import ArenaEnv, Episode, RangesAt
 from mjx_arenas.envs.config import chosen_config, env_config
+from mjx_arenas.envs.tasks import defaults as defaults_
 from mjx_arenas.envs.tasks import goals, looks
+from mjx_arenas.envs.tasks.defaults import Defaults
 from mjx_arenas.envs.vision import Vision
 from mjx_arenas.keywords import check_known
 from mjx_arenas.params.distributions import Choice, LogUniform, Uniform
@@ -115,27 +117,6 @@ class Hand(NamedTuple):
     tool: chain.Tool
 
 
-class Defaults(NamedTuple):
-    """What a task of an arm has of its own; arena, ranges and place of the arm only where no arena is given."""
-
-    arena: Callable[[Arm], Arena]
-    """Makes its arena, for an arm whose reach it may ask for."""
-    ranges: Callable[[], ArenaRanges]
-    """Makes its ranges."""
-    on: int | str | None = 0
-    """The table that carries the arm, by index or name; None: the arm stands in the world."""
-    pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """(3,) place of the foot of the arm there [m]."""
-    marks: Callable[[mujoco.MjSpec], None] = lambda spec: None
-    """Adds the marker of the goal to any arena."""
-    does: str = ""
-    """Verb for what the task does to the arena's first object, such as "lift", in messages; "": it needs no object."""
-    grips: bool = True
-    """Whether its gripper holds the object, which must then be narrow enough, and must not slip by its friction cone."""
-    max_contacts: int = 48
-    """Number for one world. By default an arena has room for contacts of any two parts, which is slow."""
-
-
 class Given(TypedDict, total=False):
     """Arguments that all tasks of arms take besides their configuration."""
 
@@ -176,8 +157,8 @@ class ArmTask(ArenaEnv):
         config_overrides: dotted names and values.
         ranges: ranges of the arenas. None: those of the task; in an arena of your own nothing varies. The quantity "arm_start" is added to
             the joints with which an arm starts.
-        arena: arena with its objects, not compiled yet. None: that of the task. `Object(place=Place(near="arm_base", distance=arm.reach))`
-            keeps an object within reach; "arm_base" is the arm's base with the prefix "arm_".
+        arena: arena with its objects, not compiled yet. None: that of the task. `Place(near="arm_" + arm.base, distance=arm.reach)` of an
+            object keeps it within reach.
         arm: the arm. None: `arms.small()`.
         on: the table, by index or name, or the surface or part of furniture that carries the arm. None: the arm stands in the world. If the
             argument is left out: the task's own place, or the world in an arena of your own.
@@ -203,6 +184,7 @@ class ArmTask(ArenaEnv):
     ) -> None:
         own_names = (name for name in inspect.signature(type(self)).parameters if name != "given")
         check_known(type(self).__name__, [*dict.fromkeys([*own_names, *Given.__annotations__])], given)
+        defaults_.check(defaults)
         known.check_config(config)
         chosen: Any = chosen_config(config, config_overrides or {}, list(default_config()))
         _check(chosen)
@@ -249,9 +231,8 @@ class ArmTask(ArenaEnv):
         if self._holds:
             graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
-        if defaults.does:
-            self.foot = Foot.of(self.arena, base, arm, moves.moves(arm, self._chain, chosen.keyframe))
-        self._thing = model.joint(arena.objects[0].joint).dofadr[0] if arena.objects else 0
+        moved = moves.moves(arm, self._chain, chosen.keyframe) if defaults.does else None
+        self.foot = None if moved is None else Foot.of(self.arena, base, arm, moved)
         self.flaws = flaws.of(chosen, self.neutral_action)
 
     def reset(self, rng: jax.Array) -> State:
@@ -301,6 +282,7 @@ class ArmTask(ArenaEnv):
 
     def drive(self, data: mjx.Data, episode: Episode, action: jax.Array) -> jax.Array:
         """As of `ArenaEnv`. Inverse kinematics are those of the nominal arm, also where links vary, as a real controller knows no other."""
+        refusals.check_drive(self, ArmTask)
         q, scale = data.qpos[self._q], self._scale
         before = jnp.where(data.time == 0, q, data.ctrl[self._servo])  # an arm stays where it starts
         if self._config.action == "joint":
@@ -347,6 +329,8 @@ class ArmTask(ArenaEnv):
 
     def middle(self, params: ArenaParams, qpos: jax.Array) -> jax.Array:
         """(3,) middle of the first object where it is at `qpos` (nq,), in the world [m]; its origin may be elsewhere."""
+        if not self.arena.objects:
+            raise error([problem(f"{type(self).__name__}.middle", "needs_does")])
         return goals.middle(self.arena, params, qpos)
 
     def thing(self, data: mjx.Data, episode: Episode) -> tuple[jax.Array, jax.Array]:
@@ -357,14 +341,16 @@ class ArmTask(ArenaEnv):
 
     def takes(self, params: ArenaParams, qpos: jax.Array, lift: float = 0.0) -> jax.Array:
         """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and takes it if it must."""
+        if self.foot is None:
+            raise error([problem(f"{type(self).__name__}.takes", "needs_does")])
         place = self.middle(params, qpos)
         beyond = self.foot.beyond(params, jnp.stack([place, place.at[2].add(lift)])).max()
         reached = beyond <= graspable.SLACK
         return reached & graspable.taken(self.arena, params, self.arm.width) if self._holds else reached
 
-    def thing_velocity(self, data: mjx.Data) -> jax.Array:
-        """(3,) velocity of the first object in the axes of the arm's base [m/s]."""
-        return self.local_vector(data, data.qvel[self._thing : self._thing + 3])
+    def thing_velocity(self, data: mjx.Data, episode: Episode) -> jax.Array:
+        """(3,) velocity of the middle of the first object in the axes of the arm's base [m/s]."""
+        return self.local_vector(data, goals.middle_velocity(self.arena, episode.params, data))
 
     def proprioception(self, data: mjx.Data, episode: Episode | None = None) -> jax.Array:
         """(3n + 2f + 5,) the arm's knowledge of itself: see docs/arms.md. `episode` as for `hand`."""

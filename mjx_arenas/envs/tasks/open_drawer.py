@@ -18,7 +18,8 @@ from mjx_arenas.envs.arms.foot import Foot
 from mjx_arenas.envs.arms.opening import thinnest
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import manipulation
-from mjx_arenas.envs.tasks.manipulation import ArmTask, Defaults, Given
+from mjx_arenas.envs.tasks.defaults import Defaults
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.furniture.drawers import LEFT_INSIDE, Drawers
 from mjx_arenas.furniture.part import Box, named
 from mjx_arenas.furniture.standing import frames, numbers_of

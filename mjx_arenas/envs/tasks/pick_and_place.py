@@ -15,11 +15,11 @@ from mjx_arenas.envs.arms.arm import Arm
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals as goals_
 from mjx_arenas.envs.tasks import manipulation
+from mjx_arenas.envs.tasks.defaults import Defaults
 from mjx_arenas.envs.tasks.goals import GOAL_RADIUS, surface_numbers
 from mjx_arenas.envs.tasks.manipulation import (
     TABLES_DECIDE,
     ArmTask,
-    Defaults,
     Given,
     firm_grips,
     gripped,
@@ -158,7 +158,7 @@ class PickAndPlace(ArmTask):
         goal = self.local(data, task.pos) - pos
         state = jnp.concatenate([self.proprioception(data, episode), pos - tool, mat[:, 0], mat[:, 1], goal])
         more = [*surface_numbers(task.start), *surface_numbers(task.below)]
-        more += [self.thing_velocity(data), *thing_numbers(episode.params), task.frictions]
+        more += [self.thing_velocity(data, episode), *thing_numbers(episode.params), task.frictions]
         return {"state": state, "privileged_state": jnp.concatenate([state, *more])}
 
     def score(
@@ -174,7 +174,7 @@ class PickAndPlace(ArmTask):
         height = task.pos[2] + task.above + way * (tops.max() + CLEARANCE - task.pos[2])
         high = 1 - jnp.tanh(8 * jnp.abs(at[2] - height))
         near = jnp.maximum(1 - distance / 0.8, 0.0)
-        speed = jnp.sqrt((self.thing_velocity(data) ** 2).sum() + 1e-12)
+        speed = jnp.sqrt((self.thing_velocity(data, episode) ** 2).sum() + 1e-12)
         rests = (jnp.abs(at[2] - task.pos[2] - task.above) < 0.01) & (speed < SLOW)
         placed, free = (distance < GOAL_RADIUS) & rests, FREE + episode.params.object_full_sizes[0].max() / 2
         success = placed & (off > free)

@@ -13,7 +13,8 @@ from mjx_arenas.envs.arms.moves import HEIGHTS
 from mjx_arenas.envs.arms.report import HEADINGS
 from mjx_arenas.envs.base import Episode
 from mjx_arenas.envs.tasks import goals, manipulation
-from mjx_arenas.envs.tasks.manipulation import ArmTask, Defaults, Given
+from mjx_arenas.envs.tasks.defaults import Defaults
+from mjx_arenas.envs.tasks.manipulation import ArmTask, Given
 from mjx_arenas.params.distribution import DRAWN
 from mjx_arenas.params.params import ArenaParams, ArenaRanges
 from mjx_arenas.rows import dot

@@ -27,7 +27,7 @@ class Seen(NamedTuple):
     tip_velocity: jax.Array  # (3,)
     box: jax.Array  # (3,) its middle
     yaw: jax.Array  # () of the box [rad]
-    velocity: jax.Array  # (3,) of the box
+    velocity: jax.Array  # (3,) of its middle
 
 
 class ToGoal(ArenaEnv):
@@ -62,7 +62,6 @@ class ToGoal(ArenaEnv):
         model = self.arena.mj_model
         self._slides = [model.joint(f"robot_{axis}") for axis in "xyz"]
         self._box = self.arena.layout.object_qpos[0]
-        self._box_velocity = model.jnt_dofadr[model.body("box").jntadr[0]]
 
     def surface(self, params: ArenaParams, index: Any) -> Surfaces:
         """One of the arena's tables and surfaces in a world."""
@@ -79,8 +78,9 @@ class ToGoal(ArenaEnv):
     def look(self, data: mjx.Data, params: ArenaParams) -> Seen:
         """The places and velocities of the robot's tip and of the box."""
         w, x, y, z = (data.qpos[i] for i in self._box[3:])
-        yaw, at = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2)), self._box_velocity
-        return Seen(*self.tip(data), goals.middle(self.arena, params, data.qpos), yaw, data.qvel[at : at + 3])
+        yaw = jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
+        middle, velocity = goals.middle(self.arena, params, data.qpos), goals.middle_velocity(self.arena, params, data)
+        return Seen(*self.tip(data), middle, yaw, velocity)
 
 
 def _check_alone(spec: mujoco.MjSpec) -> None:
