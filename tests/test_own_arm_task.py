@@ -177,7 +177,7 @@ WRONG = {
     ),
     "takes": (
         of(Takes),
-        "`Takes.takes` is about the arena's first object: say what the task does to it, `Defaults(does=...)`.",
+        "`Takes.middle` is about the arena's first object: say what the task does to it, `Defaults(does=...)`.",
     ),
     "middle": (of(Middles), "`Middles.middle` is about the arena's first object: say what the task does to it, "),
     "other actions": (

@@ -232,7 +232,7 @@ class ArmTask(ArenaEnv):
             graspable.warn_of_cone(model.opt)
             graspable.warn_of_wide(arena, self._ranges_at(jnp.ones(())), arm.width)
         moved = moves.moves(arm, self._chain, chosen.keyframe) if defaults.does else None
-        self.foot = None if moved is None else Foot.of(self.arena, base, arm, moved)
+        self._foot = None if moved is None else Foot.of(self.arena, base, arm, moved)
         self.flaws = flaws.of(chosen, self.neutral_action)
 
     def reset(self, rng: jax.Array) -> State:
@@ -257,6 +257,13 @@ class ArmTask(ArenaEnv):
     def _steps(self, state: State) -> jax.Array:
         """() of the episode so far."""
         return jnp.round(state.data.time / self.dt).astype(jnp.int32)
+
+    @property
+    def foot(self) -> Foot:
+        """Where the arm stands, and what it reaches from there."""
+        if self._foot is None:
+            raise error([problem(f"{type(self).__name__}.foot", "needs_does")])
+        return self._foot
 
     @property
     def action_size(self) -> int:
@@ -341,8 +348,6 @@ class ArmTask(ArenaEnv):
 
     def takes(self, params: ArenaParams, qpos: jax.Array, lift: float = 0.0) -> jax.Array:
         """() bool: the arm reaches the first object where it is at `qpos` (nq,), and `lift` [m] above, and takes it if it must."""
-        if self.foot is None:
-            raise error([problem(f"{type(self).__name__}.takes", "needs_does")])
         place = self.middle(params, qpos)
         beyond = self.foot.beyond(params, jnp.stack([place, place.at[2].add(lift)])).max()
         reached = beyond <= graspable.SLACK
