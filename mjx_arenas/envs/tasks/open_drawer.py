@@ -150,7 +150,7 @@ class OpenDrawer(ArmTask):
         self._slide, self._speed = joint.qposadr[0], joint.dofadr[0]
         keyframe: Any = self.config.keyframe
         moved, base = moves.moves(self.arm, self._chain, keyframe), manipulation.PREFIX + self.arm.base
-        self.foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
+        self._foot, self._goes = Foot.of(self.arena, base, self.arm, moved), heights.anywhere(self.arm, moved)
         self._thin = thinnest(specs.compiled(self.arm.spec, "arm.spec"), keyframe, self.arm.tool)
         self._stands = np.concatenate([np.ones(len(self.arena.table_names), bool), self._solid()])
         if given:  # all that is the task's own is in reach
