@@ -226,7 +226,8 @@ def _actions(policy: Policy, obs: Any, keys: jax.Array, t: Any, env: Any) -> jax
 def _on_mjx(env: Any, policy: Policy, keys: jax.Array) -> Log:
     def record(state: Any) -> Log:
         told = {name: x > 0 for name, x in state.metrics.items()}
-        unsound = told["nan_state"], told["nan_action"], told["invalid_arena"], _impossible(state)
+        bad_action = told.get("nan_action", jnp.zeros_like(state.done, bool))  # environments of others may not tell
+        unsound = told["nan_state"], bad_action, told["invalid_arena"], _impossible(state)
         return Log(told["success"], state.done > 0, *unsound, told["dropped_contacts"], told["solver_limits"])
 
     return Log(*map(np.asarray, episode(env, policy, keys, record)[1]))
