@@ -1,6 +1,5 @@
 """What a policy is worth: one episode in each of many arenas that no training has seen, on MJX or in C MuJoCo."""
 
-import functools
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -118,19 +117,13 @@ def _check(policy: Any, env: Any, seed: Any, engine: str | None) -> None:
 
 def _check_actions(policy: Policy, env: Any, keys: jax.Array, engine: str | None) -> None:
     """Refuses what the policy cannot do with what it sees, or gives wrongly, before anything is compiled."""
-    seen = jax.eval_shape(_reset(env), keys).obs
+    seen = jax.eval_shape(jax.vmap(env.reset), keys).obs
     if engine == "c" and isinstance(seen, Mapping) and any(name.startswith("pixels/") for name in seen):
         raise validation.error([problem("env", "env_in_c")])
     before = refusals.drawn_on_host()
     jax.eval_shape(lambda obs: _actions(policy, obs, keys, 0, env), seen)
     if refusals.drawn_on_host() != before:
         warn(problem("policy", "policy_draws_on_host"))
-
-
-@functools.lru_cache(maxsize=4)
-def _reset(env: Any) -> Callable[[jax.Array], Any]:
-    """The compiled start of worlds of an environment, the same in each call."""
-    return jax.jit(jax.vmap(env.reset))
 
 
 def shares(log: Log) -> dict[str, float]:
@@ -193,7 +186,7 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
             state = jax.vmap(env.step)(state.replace(done=jnp.zeros_like(state.done)), actions)
             return state, record(state)
 
-        first = _reset(env)(keys)
+        first = jax.vmap(env.reset)(keys)
         return first, jax.lax.scan(step, first, jnp.arange(episode_length(env)))[1]
 
     return run(keys)
@@ -246,7 +239,7 @@ def _judged(
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
-    first = _reset(env)(keys)
+    first = jax.jit(jax.vmap(env.reset))(keys)
     episodes = first.info["episode"]
     start = data_.blank(env.mj_model)
     names = shared(start, mujoco.MjData(env.mj_model))
