@@ -309,7 +309,9 @@ def test_configurations(task, capsys):
             assert settings.problem(config, 1) is None
             assert settings.learner(config)["num_envs"] == ((4096 if pixels else 8192) if gpu else 64)
     assert cli.main(["train", task, "--show"]) == 0
-    assert f"task: {task}" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert f"task: {task}" in shown
+    assert not re.search(r"^\w+:\n(?! )", shown, re.MULTILINE), shown  # no name without a value
 
 
 def trainings():

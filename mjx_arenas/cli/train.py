@@ -154,7 +154,8 @@ def train(
         config = _configuration(task, said := _said(short, more, pixels), pixels, out)
         if show:
             training.check(config)
-            click.echo(text.dump(config, pathlib.Path("config.yaml")).rstrip())
+            said_or_default = {name: value for name, value in config.items() if value is not None}
+            click.echo(text.dump(said_or_default, pathlib.Path("config.yaml")).rstrip())
             return
         _run(config, out, by_default=not _say_steps(said, pixels) and _steps_of_library(config))
         click.echo("\n".join(training.results(out)))
