@@ -10,6 +10,8 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding
 from jax.sharding import PartitionSpec as P
 
+from mjx_arenas.extras import extra
+
 _AXIS = "i"  # of the `pmap` in Brax's trainers
 
 
@@ -26,6 +28,7 @@ def device_put_replicated() -> Iterator[None]:
     types. The first states of Brax's evaluations, too, are like what the evaluations return: on a fixed device. So JAX compiles the
     training once instead of twice, and the evaluation once instead of up to four times.
     """
+    extra("brax", "train")
     from brax.training.acting import Evaluator
 
     run = Evaluator.run_evaluation

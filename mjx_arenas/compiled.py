@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import content
-from mjx_arenas.build import aims, assemble, from_mjcf, points
+from mjx_arenas.build import aims, assemble, from_mjcf, points, springs
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
@@ -149,7 +149,7 @@ class Compiled(Shown):
             ValueError: an addition to `spec` would make a world depend on more than its parameters.
         """
         if self._model is None:
-            points.end(self.spec, self._parts.varied)
+            self._finish(self.spec)
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
             self._compiled_xml = self._xml_of_spec()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
@@ -219,7 +219,11 @@ class Compiled(Shown):
         if self.is_compiled:
             return self.unchanged().spec.copy()
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
-        return points.end(self.spec.copy(), self._parts.varied)
+        return self._finish(self.spec.copy())
+
+    def _finish(self, spec: mujoco.MjSpec) -> mujoco.MjSpec:
+        """The spec, changed to what can be said only once all terms are known."""
+        return springs.keep(points.end(spec, self._parts.varied), self._parts.varied)
 
     def __copy__(self) -> Self:
         return self.__deepcopy__({})

@@ -72,7 +72,7 @@ class Term(WithKnownArguments):
         given = [self.axes] if isinstance(self.axes, str) else self.axes
         if not patterns.are_texts(given) or not set(given) <= set(known):
             rule = "axes" if known else "no_axes"
-            return [problem("axes", rule, None, self.axes, names=known, attribute=self.attribute)]
+            return [problem("axes", rule, None, self.axes, names=[*map(repr, known)], attribute=self.attribute)]
         return []
 
     @property

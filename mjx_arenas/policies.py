@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mjx_arenas import settings
+from mjx_arenas.extras import extra
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.rules.validation import check_path
@@ -87,7 +88,9 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
 
     Raises:
         ValueError: there is no such training.
+        ImportError: Brax is not installed.
     """
+    extra("brax", "train")
     from brax.training import checkpoint, types
     from brax.training.acme import running_statistics
     from brax.training.agents.bc import networks as bc_networks

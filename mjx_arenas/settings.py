@@ -51,6 +51,8 @@ _ABOVE = {"arenas": "--arenas", "impl": "--engine"}
 """Keys of an environment's configuration that the training has itself, and their options on the command line."""
 DIGEST = "arena_sha256"
 """The key of a configuration for the digest of its arena's file; trainings before 2026-11-29 have none."""
+MADE = "made"
+"""The key of a configuration for what a task of a user's own makes, whose code may change; trainings before 2026-11-30 have none."""
 _TOP = ("task", "env", "ranges", "wider_ranges", "arenas", "impl", "seed", "stages", "eval_worlds", "ppo", "dagger")
 
 

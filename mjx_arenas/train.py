@@ -54,9 +54,12 @@ def run(config: dict[str, Any], out: pathlib.Path, say: Say = print) -> None:
         ValueError: another training is in the folder, or nothing can be trained so.
         MemoryError: there is too little.
     """
+    from mjx_arenas.envs.tasks import configured
     from mjx_arenas.sim.warp_notes import no_room_answered
 
     config, old = json.loads(json.dumps(config)), before(out)
+    if settings.is_own(config["task"]):
+        config[settings.MADE] = configured.made(config)
     saved, finished = out / "config.json", out / "result.json"
     if old is not None and (why := conflict(config, old, saved)):
         raise error([why])
@@ -180,8 +183,13 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
     """Why a training cannot go on from what another one left in a folder; for more stages of the same length it can."""
     # The file of an arena is known by what it says, wherever it is; older trainings know its path alone.
     left_out = "env.arena" if settings.DIGEST in config and settings.DIGEST in old else settings.DIGEST
+    unknown = () if settings.MADE in config and settings.MADE in old else (f"{settings.MADE}.",)
     new, was = (
-        {name: x for name, x in settings.flat(one).items() if x != {} and not name.endswith(left_out)}
+        {
+            name: x
+            for name, x in settings.flat(one).items()
+            if x != {} and not name.endswith(left_out) and not name.startswith(unknown)
+        }
         for one in (config, old)
     )
     differing = [name for name in {**new, **was} if new.get(name) != was.get(name)]
@@ -199,4 +207,6 @@ def conflict(config: dict[str, Any], old: dict[str, Any], saved: pathlib.Path) -
 def _differs(name: str, was: dict[str, Any], new: dict[str, Any]) -> str:
     if name.endswith(settings.DIGEST):
         return "the arena's file has changed"
-    return f"{name} {was.get(name)} instead of {new.get(name)}"
+    told = name.removeprefix(f"{settings.MADE}.")
+    whose = "" if told == name else "the task's "
+    return f"{whose}{told} {was.get(name)} instead of {new.get(name)}"

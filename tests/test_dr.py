@@ -213,7 +213,7 @@ WRONG = {
     ),
     "axes": (
         {"x": dr.Term("geom.friction", axes=("rolling", "x"))},
-        "`x.axes` must be some of sliding, torsional, rolling, the axes of 'geom.friction', got ('rolling', 'x').",
+        "`x.axes` must be some of 'sliding', 'torsional', 'rolling', the axes of 'geom.friction', got ('rolling', 'x').",
     ),
     "no axes": (
         {"x": dr.Term("body.mass", axes="x")},

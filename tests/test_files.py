@@ -12,7 +12,7 @@ import pytest
 from command import write
 
 import mjx_arenas as mja
-from mjx_arenas import furniture
+from mjx_arenas import dr, furniture
 from mjx_arenas.files import paths
 from mjx_arenas.files import schema as file_calls
 from mjx_arenas.spec import specs
@@ -203,6 +203,36 @@ def test_edits_come_back(name, tmp_path):
             np.testing.assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max(), err_msg=field)
         assert other.opt.timestep == 1 / 700
         arena, ranges = again, same_ranges
+
+
+SERVO = """<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/><geom name="g" size=".1" pos=".2 0 0" mass="1"/></body>
+</worldbody><actuator><motor joint="j"/><position name="p" joint="j" kp="10" dampratio="1"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("how", ["given", "edited"])
+def test_a_dampratio_comes_back(how, tmp_path):
+    """It is in the MJCF as a ratio, though MuJoCo writes the damping there: in worlds with another gain the damping is another."""
+    arena = mja.Arena.from_xml(mujoco.MjSpec.from_string(SERVO) if how == "given" else SERVO)
+    if how == "edited":
+        arena.spec.worldbody.add_site(name="mine")
+    arena.vary(kp=dr.Term("actuator.kp", "p"))
+    mja.save(tmp_path / "arena.yaml", arena)
+    dampings = []
+    for one in (arena, mja.load(tmp_path / "arena.yaml")[0]):
+        nominal = jax.tree.map(np.asarray, one.nominal_params())
+        made = one.compile(nominal._replace(terms={"kp": nominal.terms["kp"] * 4}))
+        dampings.append(made.actuator_biasprm[1, 2] / one.mj_model.actuator_biasprm[1, 2])
+    np.testing.assert_allclose(dampings, 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("attribute", ["geom.pos", "body.payload", "geom.size"])
+def test_a_term_is_no_edit(attribute, tmp_path):
+    """What `vary` writes into the spec, also where the arena is compiled, is not written beside the file."""
+    arena = mja.Arena.from_xml(SERVO)
+    arena.vary(x=dr.Term(attribute, "b" if attribute.startswith("body") else "g"))
+    assert arena.mj_model
+    mja.save(tmp_path / "arena.yaml", arena)
+    assert [path.name for path in tmp_path.iterdir()] == ["arena.yaml"]
 
 
 def test_edits_with_files_come_back(tmp_path):

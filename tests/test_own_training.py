@@ -1,5 +1,6 @@
 """Tasks and arms of a user's own, by `module:function`: trained, resumed, drawn and judged as those of the library are."""
 
+import importlib
 import json
 import os
 import sys
@@ -15,8 +16,9 @@ from PIL import Image
 from test_train import ARGUMENTS
 
 import mjx_arenas as mja
-from mjx_arenas import judged, policies
+from mjx_arenas import judged, policies, settings, train
 from mjx_arenas.envs.tasks import configured
+from mjx_arenas.problems import messages
 from mjx_arenas.viz import render
 
 MINE = """
@@ -130,6 +132,34 @@ def test_environment_of_a_training(mine, monkeypatch):
         policies.load_env(mine / "nowhere")
     with pytest.raises(TypeError, match=r"^`folder` must be a path, got NoneType\.$"):
         policies.load_env(None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("Uniform(-0.5, 0.5)", "Uniform(-0.25, 0.25)", "the task's range.table_rots Uniform(low=-0.5, high=0.5"),
+        (
+            '{"sim_dt": 0.05}',
+            '{"sim_dt": 0.05, "episode_length": 7}',
+            "the task's config.episode_length 3 instead of 7",
+        ),
+        ("return 3", "return 3 # as before", None),
+    ],
+    ids=["ranges", "configuration", "nothing"],
+)
+def test_a_task_that_has_changed(old, new, told, mine):
+    """A training does not go on with a task whose ranges, configuration or sizes the user has changed in the meantime."""
+    sys.path.insert(0, str(mine))
+    config = settings.configuration({**settings.settled(settings.read("mine:slide"), False, False)}, "jax", False)
+    before = config | {"made": configured.made(config)}
+    (mine / "mine.py").write_text(textwrap.dedent(MINE).replace(old, new))
+    sys.modules.pop("mine")
+    importlib.invalidate_caches()
+    after = config | {"made": configured.made(config)}
+    assert train.conflict(before, before, mine) is None
+    assert train.conflict(after, config, mine) is None  # of an older training nothing is known
+    found = train.conflict(after, before, mine)
+    assert (told in str(messages.error([found]))) if told else found is None
 
 
 @pytest.mark.parametrize("own", [{}, {"config": {"arenas": "fixed"}}], ids=["of the task", "of an older training"])

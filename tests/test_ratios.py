@@ -108,6 +108,18 @@ def test_without_gain():
     np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
 
 
+@pytest.mark.parametrize("gear", [0.0, 1e-9, 1.0])
+def test_without_gear(gear):
+    """A servo that has a ratio and a gear of nearly 0 has no damping in that world; it was infinite."""
+    made = mja.Arena.from_xml(ROBOT)
+    made.vary(gear=dr.Term("actuator.gear", ["hip", "fixed", "lift"], axes="first"))
+    nominal = jax.tree.map(np.asarray, made.nominal_params())
+    params = nominal._replace(terms={"gear": np.full_like(nominal.terms["gear"], gear)})
+    want = made.compile(params).actuator_biasprm[:, 2]
+    assert (want[[0, 2, 4]] == 0).all() == (gear < 1)
+    np.testing.assert_allclose(written(made.record.scene, params).actuator_biasprm[:, 2], want, rtol=1e-7)
+
+
 def as_in_mjcf(params, quantities):
     """The model of the MJCF in which the drawn numbers were written, by shortcuts."""
     xml, names = ROBOT, {"ratio": "dampratio", "kp": "kp"}

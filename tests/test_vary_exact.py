@@ -145,6 +145,23 @@ def test_exact(case, impl):
     exact(*CASES[case], impl)
 
 
+@pytest.mark.parametrize("order", [("end", "spring"), ("spring", "end")])
+def test_a_tendon_that_gets_a_spring(order):
+    """Its length where the ends stand is not taken for that of its spring, in whatever order the terms come; one in the MJCF is."""
+    terms = {"end": dr.Term("site.pos", "s0"), "spring": dr.Term("tendon.stiffness", "t")}
+    for given in ("", 'springlength=".5"'):
+        arena = mja.Arena.from_xml(STRUNG.format(given))
+        for name in order:
+            arena.vary(**{name: terms[name]})
+        if given:
+            assert (arena.mj_model.tendon_lengthspring == 0.5).all()
+        else:
+            with pytest.raises(
+                ValueError, match=r"tendon_lengthspring of tendon 't' would be stale .*: it follows from `end`"
+            ):
+                _ = arena.mj_model
+
+
 @pytest.mark.parametrize("name", ["site.pos", "site.rpy"])
 def test_cranks(name):
     """Of sliders and cranks, which MJX has on Warp."""
@@ -244,7 +261,15 @@ TURNING = BODY.format(
 ON_BALL = BODY.format(
     '<joint name="j" type="ball"/>', "", '<actuator><position name="m" joint="j" kp="3" dampratio="1"/></actuator>'
 )
+STRUNG = """<mujoco><worldbody><site name="s0" pos="0 0 .5"/><body><joint axis="0 1 0"/><geom size=".05" pos=".1 0 0"/>
+<site name="s1" pos=".2 0 0"/></body></worldbody><tendon><spatial name="t" {}><site site="s0"/><site site="s1"/></spatial>
+</tendon></mujoco>"""
 REFUSED = {
+    "a spring that bends": (
+        STRUNG.format('stiffness="0 500 0"'), dr.Term("site.pos", "s0"), "warp",
+        "`arena.spec`: tendon_lengthspring of tendon 't' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
+        "takes it from where the tendon's ends stand: give the tendon a `springlength`.",
+    ),
     "a muscle's range": (
         MUSCLE, dr.Term("site.pos", "s"), "warp",
         "`arena.spec`: actuator_lengthrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "

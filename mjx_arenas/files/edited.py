@@ -84,9 +84,16 @@ def _close(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _text(spec: mujoco.MjSpec) -> str:
-    """MJCF in full precision; a site's size with the numbers that its type does not use, for which MJCF has another default."""
+    """MJCF in full precision, with two things that MuJoCo leaves out.
+
+    These are the numbers of a site's size that its type does not use, for which MJCF has another default, and the `dampratio` of servos,
+    which `<general>` has in its `biasprm` and MuJoCo replaces by the damping.
+    """
     spec, root = xml_tree(spec)
     for element in root.iter("site"):
         if element.get("name"):
             element.set("size", " ".join(f"{x:.17g}" for x in np.asarray(spec.site(element.get("name")).size)))
+    for actuator, element in zip(spec.actuators, root.iterfind("actuator/*"), strict=True):
+        if element.tag == "general" and actuator.biasprm[2] > 0:
+            element.set("biasprm", " ".join(f"{x:.17g}" for x in actuator.biasprm))
     return ElementTree.tostring(root, encoding="unicode")

@@ -1,9 +1,9 @@
 """Dampings of position servos that the compiler makes of their `dampratio`; NumPy or JAX.
 
 They are 2 dampratio sqrt(kp / w) / |gear|, with the inverse weight w at `qpos0` of the servo's degree of freedom or
-tendon. That of a body that only slides has its armature, too, which its `dof_invweight0` leaves out. The ratio itself is in no
-compiled model: another world's damping follows from the nominal one. Where the ratio varies, its row has what the damping would be with
-the nominal gain, gear and weight.
+tendon, and 0 without a gear (`mj_setConst`). That of a body that only slides has its armature, too, which its
+`dof_invweight0` leaves out. The ratio itself is in no compiled model: another world's damping follows from the nominal
+one. Where the ratio varies, its row has what the damping would be with the nominal gain, gear and weight.
 """
 
 from collections.abc import Collection
@@ -71,4 +71,6 @@ class Ratios(NamedTuple):
             share = xp.where(
                 self.written, -model.actuator_biasprm[self.ids, 2] / self.nominal.astype(weight.dtype), share
             )
-        return share * xp.sqrt(gain / weight) / xp.abs(model.actuator_gear[self.ids, 0])
+        gear = xp.abs(model.actuator_gear[self.ids, 0])
+        turns = gear * gear > mujoco.mjMINVAL
+        return xp.where(turns, share * xp.sqrt(gain / weight) / xp.where(turns, gear, 1.0), 0.0)

@@ -1,10 +1,12 @@
 """The tasks that can be trained, and their environments by configurations: on which arenas, and on what else they are judged."""
 
 import dataclasses
+import json
 import pathlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from mjx_arenas import settings
@@ -107,6 +109,27 @@ def _environment(config: Mapping[str, Any], where: str, overrides: Mapping[str, 
     wrist = "arm" in chosen.takes
     ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects, wrist)
     return chosen.kind(ranges=ranges, **given, **seen)
+
+
+def made(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What a task of a user's own is, beyond its configuration: what tells it from the same after a change of its code.
+
+    Args:
+        config: of a training.
+
+    Returns:
+        Sizes of actions and observations, the environment's configuration, and ranges by their text, as JSON has them.
+    """
+    env: Any = environment(config, overrides={"arenas": config["arenas"]})
+    ranges = env.ranges._asdict() if isinstance(env.ranges, ArenaRanges) else {}
+    ranges |= {f"terms.{name}": one for name, one in (ranges.pop("terms", None) or {}).items()}
+    found = {
+        "actions": env.action_size,
+        "observations": {name: x.shape for name, x in jax.eval_shape(env.reset, jax.random.key(0)).obs.items()},
+        "config": env.config.to_dict(),
+        "range": {name: repr(one) for name, one in ranges.items() if one is not None},
+    }
+    return json.loads(json.dumps(found, default=repr))
 
 
 def check_worlds(env: ArenaEnv, worlds: int = 64) -> None:

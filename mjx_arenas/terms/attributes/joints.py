@@ -34,7 +34,7 @@ from mjx_arenas.terms.attributes.attribute import (
     setter,
     unit,
 )
-from mjx_arenas.terms.attributes.prepare import always, keep_springs, slack
+from mjx_arenas.terms.attributes.prepare import always
 
 JOINT_TRN = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
@@ -106,7 +106,6 @@ def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 
 def _along(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
     """Anchor and axis as the compiler found them, in no frame but the body's."""
-    keep_springs(spec, model)
     if element.frame is not None:
         element.set_frame(element.parent.add_frame())
     specs.assign(element, pos=model.jnt_pos[index], axis=model.jnt_axis[index])
@@ -163,7 +162,6 @@ JOINTS = {
         number("joint", "", "[rad] or [m]"),
         Target("qpos0"),
         lambda model, ids: np.array(model.qpos0[qpos(model, ids)]),
-        prepare=slack,
         refused=axis_joint,
     ),
     "joint.springref": of_angle(

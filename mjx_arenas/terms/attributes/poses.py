@@ -21,7 +21,7 @@ from mjx_arenas.terms.attributes.attribute import (
     of_model,
     reader,
 )
-from mjx_arenas.terms.attributes.prepare import keep_springs, weighed
+from mjx_arenas.terms.attributes.prepare import weighed
 
 
 def turned(field: str) -> Callable[[Array, mujoco.MjModel, np.ndarray], Array]:
@@ -107,7 +107,6 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
             element.dir = model.light_dir[index]
         if kind == "body" and model.body_mass[index] == 0:
             weighed(spec, element, model, index)  # or the compiler takes its place in the world for its centre of mass
-        keep_springs(spec, model)
         put(element, kind, model, index, of_model(model, f"{prefix}_pos")[index], quat)
 
     return prepare

@@ -31,18 +31,6 @@ def weighs(geom: Any) -> bool:
     return masses.inferred(geom.parent) and masses.weighs(geom) and weight != 0
 
 
-def keep_springs(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Gives tendons without stiffness the length of their springs, which the compiler takes from where their ends stand."""
-    for index, tendon in enumerate(spec.tendons):
-        if tendon.springlength[0] < 0 and not model.tendon_stiffness[index]:
-            tendon.springlength = model.tendon_lengthspring[index]
-
-
-def slack(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
-    """The same, for what moves the ends of tendons."""
-    keep_springs(spec, model)
-
-
 def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:
     """Why a body cannot be given an inertial of its own."""
     rule = element.compiler.inertiafromgeom
