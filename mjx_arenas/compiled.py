@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import content
-from mjx_arenas.build import aims, assemble, from_mjcf, points, springs
+from mjx_arenas.build import aims, assemble, finish, from_mjcf
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
@@ -149,7 +149,7 @@ class Compiled(Shown):
             ValueError: an addition to `spec` would make a world depend on more than its parameters.
         """
         if self._model is None:
-            self._finish(self.spec)
+            finish.finished(self.spec, self._parts.varied)
             model, given = proof.prove(self.spec, self._parts, self._nominal, type(self).__name__)
             self._compiled_xml = self._xml_of_spec()
             self._record = Record.of(model, self.spec, self._parts, self._nominal, given)
@@ -219,11 +219,7 @@ class Compiled(Shown):
         if self.is_compiled:
             return self.unchanged().spec.copy()
         validation.raise_all(self._parts.problems(self.spec), "`arena.spec`")
-        return self._finish(self.spec.copy())
-
-    def _finish(self, spec: mujoco.MjSpec) -> mujoco.MjSpec:
-        """The spec, changed to what can be said only once all terms are known."""
-        return springs.keep(points.end(spec, self._parts.varied), self._parts.varied)
+        return finish.finished(self.spec.copy(), self._parts.varied)
 
     def __copy__(self) -> Self:
         return self.__deepcopy__({})
@@ -345,7 +341,7 @@ class Compiled(Shown):
             rubs = rubbing(self.spec, self._parts)
             friction_rules.warn_of_idle(ranges, nominal, rubs, decided=bool(contacts[1]))
             friction_rules.warn_of_spin(ranges, nominal, rubs)
-            footing_rules.warn_of_size(ranges, nominal, footings(self._parts, self._model))
+            footing_rules.warn_of_gaps(ranges, nominal, footings(self._parts, self._model))
             aims.warn_of_absent(self.spec, self._parts, ranges, nominal)
             moved = validation_ranges.moved_tables(ranges, nominal)
             if moved.any():

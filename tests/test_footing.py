@@ -106,6 +106,39 @@ def test_not_told(case):
             made.check_ranges(mja.ArenaRanges(terms={"size": SCALED}))
 
 
+RAISED = mja.Uniform([0, 0, -0.03], [0, 0, 0.02], relative="add")
+STACK = """<mujoco><worldbody><geom name="floor" type="plane" size="3 3 .1"/><body name="shelf" pos="0 0 .5" euler="{0} 0 0">
+<geom name="top" type="box" size=".3 .3 .02" euler="-{0} 0 0"/></body><body name="cube" pos="0 0 .57"><freejoint/><geom name="cube"
+type="box" size=".05 .05 .05"/></body></worldbody></mujoco>"""
+MOVED = {
+    "its body": (0, {"x": dr.Term("body.pos", "shelf")}, True),
+    "itself": (0, {"x": dr.Term("geom.pos", "top")}, True),
+    "in the plane": (0, {"x": dr.Term("geom.pos", "top", axes=("x", "y"))}, False),
+    "both at once": (0, {"x": dr.Term("geom.pos", ["top", "cube"])}, False),
+    "with what stands there": (0, {"x": dr.Term("body.pos", "shelf"), "y": dr.Term("body.start_pos", "cube")}, False),
+    "what stands there": (0, {"y": dr.Term("body.start_pos", "cube")}, False),
+    "along a tilted axis": (90, {"x": dr.Term("geom.pos", "top")}, False),
+}
+
+
+@pytest.mark.parametrize("case", MOVED)
+def test_what_is_moved_from_below(case):
+    """What stands on a place that rises or sinks without it, as C measures."""
+    turned, terms, told = MOVED[case]
+    made = mja.Arena.from_xml(STACK.format(turned))
+    made.vary(**terms)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        made.check_ranges(mja.ArenaRanges(terms=dict.fromkeys(terms, RAISED)))
+    says = "`ranges.terms.x` lets 'cube' sink up to 0.02 m into 'top' or float up to 0.03 m above 'top', on which it stands"
+    assert [str(one.message).startswith(says) for one in found] == [True] * told
+    if told:
+        nominal = jax.tree.map(np.asarray, made.nominal_params())
+        places = [with_values(nominal, {"x": nominal.terms["x"] + [0, 0, z]}) for z in (-0.03, 0.02)]
+        gaps = [gap(made.compile(one), "cube", "top") for one in places]
+        np.testing.assert_allclose(gaps, [0.03, -0.02], atol=1e-6)
+
+
 def test_what_came_later():
     """What was added after `vary` carries, too."""
     made = mja.Arena.from_xml(SCENE)

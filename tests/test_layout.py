@@ -14,9 +14,9 @@ from mjx_arenas.problems.sentences import GENERAL, SENTENCES, TABLES, WARNINGS
 TREES = structure.modules()
 FLOW = [
     *(
-        "brax_bridge",
         "content",
         "extras",
+        "brax_bridge",
         "geometry",
         "gpu",
         "caches",

@@ -138,7 +138,6 @@ def train(
       mjx-arenas train lift --show                           what would be trained
     """
     from mjx_arenas import train as training
-    from mjx_arenas.files import text
 
     if missing := training.missing():
         raise click.ClickException(
@@ -154,8 +153,7 @@ def train(
         config = _configuration(task, said := _said(short, more, pixels), pixels, out)
         if show:
             training.check(config)
-            said_or_default = {name: value for name, value in config.items() if value is not None}
-            click.echo(text.dump(said_or_default, pathlib.Path("config.yaml")).rstrip())
+            _show(config)
             return
         _run(config, out, by_default=not _say_steps(said, pixels) and _steps_of_library(config))
         click.echo("\n".join(training.results(out)))
@@ -213,6 +211,14 @@ def _steps_of_library(config: Mapping[str, Any]) -> bool:
     own = settings.read(settings.find(config["task"]))
     found = settings.settled(own, gpu=False, pixels=settings.sees_pictures(config))
     return settings.learner(config)["num_timesteps"] == found[settings.part(config)]["num_timesteps"]
+
+
+def _show(config: Mapping[str, Any]) -> None:
+    """Prints a configuration as YAML, without what is not set."""
+    from mjx_arenas.files import text
+
+    given = {name: value for name, value in config.items() if value is not None}
+    click.echo(text.dump(given, pathlib.Path("config.yaml")).rstrip())
 
 
 def _configuration(

@@ -1,11 +1,10 @@
-"""Geoms that float above what they stand on, or sink into it, because a size varies and the place does not (host)."""
+"""Geoms that float above what they stand on, or sink into it, because a size or what is below varies and their place does not (host)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from mjx_arenas import primitives
 from mjx_arenas.params.params import ArenaRanges
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import warn
@@ -16,14 +15,12 @@ LEAST = 1e-3  # that is told [m]
 
 
 class Footing(NamedTuple):
-    """A geom whose size varies, and which stands on another or carries it."""
+    """A geom that stands on another, and a quantity that decides the size of one of the two, or the place of the lower."""
 
     quantity: str
     row: int
-    kind: int
-    """`geom_type`."""
-    turn: np.ndarray
-    """(3, 3) its axes in the world, as columns."""
+    overlap: Callable[[np.ndarray], np.ndarray]
+    """How far the two reach into each other (n,) [m], up to a constant, with values (n, ...) of that row."""
     upper: str
     """What messages call the geom that stands."""
     lower: str
@@ -31,11 +28,11 @@ class Footing(NamedTuple):
     place: str
     """The attribute that places the upper one."""
     placed_by: frozenset[str]
-    """Quantities that place one of the two."""
+    """Other quantities that place one of the two."""
 
 
-def warn_of_size(ranges: ArenaRanges, nominal: Nominal, footings: Sequence[Footing]) -> None:
-    """Warns of ranges of sizes with which something floats or sinks by a millimetre or more, of each the worst case.
+def warn_of_gaps(ranges: ArenaRanges, nominal: Nominal, footings: Sequence[Footing]) -> None:
+    """Warns of ranges with which something floats or sinks by a millimetre or more, of each the worst case.
 
     Args:
         ranges: that were found right.
@@ -50,8 +47,7 @@ def warn_of_size(ranges: ArenaRanges, nominal: Nominal, footings: Sequence[Footi
             continue
         values = np.asarray(nominal.params.terms[one.quantity])
         bounds = [np.where(masks[one.quantity], b, values)[one.row] for b in (values, *reach(dist, values))]
-        kinds, turns = np.full(len(bounds), one.kind), np.broadcast_to(one.turn, (len(bounds), 3, 3))
-        now, *others = primitives.reach(kinds, np.array(bounds), turns)[:, 2]
+        now, *others = one.overlap(np.array(bounds))
         found = max(others) - now, now - min(others), one
         before = worst.get(one.quantity)
         if max(found[:2]) > LEAST and (before is None or max(found[:2]) > max(before[:2])):

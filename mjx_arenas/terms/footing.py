@@ -1,4 +1,6 @@
-"""What stands on what in a nominal arena, where the size of one varies (host)."""
+"""What stands on what in a nominal arena, where the size of one varies, or the place of the lower (host)."""
+
+import functools
 
 import mujoco
 import numpy as np
@@ -14,7 +16,7 @@ _PLACING = ("body.pos", "body.start_pos")
 
 
 def footings(parts: Parts, compiled: mujoco.MjModel | None) -> list[Footing]:
-    """One for each geom that stands freely and each of the two whose size varies.
+    """One for each geom that stands freely, and each quantity that decides the size of one of the two, or the height of the lower alone.
 
     Args:
         parts: of the arena.
@@ -23,7 +25,7 @@ def footings(parts: Parts, compiled: mujoco.MjModel | None) -> list[Footing]:
     sized = {
         name: (one, i) for one in parts.varied if one.attribute == "geom.size" for i, name in enumerate(one.elements)
     }
-    if not sized:
+    if not sized and not any(one.attribute in ("geom.pos", *_PLACING) for one in parts.varied):
         return []
     model: mujoco.MjModel = compiled or parts.varied[-1].base
     data = mujoco.MjData(model)
@@ -32,14 +34,46 @@ def footings(parts: Parts, compiled: mujoco.MjModel | None) -> list[Footing]:
     for upper, lower in _standing(model, data):
         placed_by = _placed_by(parts.varied, model, (upper, lower))
         free = model.body_dofnum[model.geom_bodyid[upper]] > 0
+        place = "body.start_pos" if free else "geom.pos"
         names = specs.geom_name(model, upper), specs.geom_name(model, lower)
+        above = _placed_by(parts.varied, model, (upper,))
+        for name, row in _raised_by(parts.varied, model, data, lower):
+            if name not in above:
+                found.append(Footing(name, row, _heights, *names, place, placed_by - {name}))
         for geom in (upper, lower):
             if model.geom(geom).name in sized:
                 term, row = sized[model.geom(geom).name]
                 turn = data.geom_xmat[geom].reshape(3, 3)
-                place = "body.start_pos" if free else "geom.pos"
-                found.append(Footing(term.name, row, int(model.geom_type[geom]), turn, *names, place, placed_by))
+                overlap = functools.partial(_halves, int(model.geom_type[geom]), turn)
+                found.append(Footing(term.name, row, overlap, *names, place, placed_by))
     return found
+
+
+def _halves(kind: int, turn: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """(n,) half heights in the world of geoms of sizes (n, 3), with axes `turn` (3, 3)."""
+    return primitives.reach(np.full(len(sizes), kind), sizes, np.broadcast_to(turn, (len(sizes), 3, 3)))[:, 2]
+
+
+def _heights(places: np.ndarray) -> np.ndarray:
+    return places[:, 2]
+
+
+def _raised_by(
+    varied: tuple[Elements, ...], model: mujoco.MjModel, data: mujoco.MjData, geom: int
+) -> list[tuple[str, int]]:
+    """Quantities that place a geom, or what it hangs on, in a frame whose z axis is the world's, with the row of what they place."""
+    body = int(model.geom_bodyid[geom])
+    places = {("geom.pos", model.geom(geom).name): body}
+    while body:
+        parent = int(model.body_parentid[body])
+        places |= {(attribute, model.body(body).name): parent for attribute in _PLACING}
+        body = parent
+    return [
+        (one.name, i)
+        for one in varied
+        for i, name in enumerate(one.elements)
+        if (frame := places.get((one.attribute, name))) is not None and data.xmat[frame, 8] > 1 - 1e-6
+    ]
 
 
 def _standing(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, int]]:
