@@ -121,6 +121,7 @@ WRONG = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:`ranges.terms.level` lets 'block' sink up to 0.05 m into 'floor'")
 @pytest.mark.parametrize("case", WRONG)
 def test_told(case, tmp_path):
     """By `valid`, `problems` and `check`, whose bundle says it again without the arena."""
