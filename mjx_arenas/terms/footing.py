@@ -110,8 +110,8 @@ def _stands_freely(model: mujoco.MjModel) -> np.ndarray:
     return free | (model.body_weldid == 0) & (model.body_mocapid < 0)
 
 
-def _placed_by(varied: tuple[Elements, ...], model: mujoco.MjModel, geoms: tuple[int, int]) -> frozenset[str]:
-    """Quantities that move one of the geoms, or what it hangs on."""
+def _placed_by(varied: tuple[Elements, ...], model: mujoco.MjModel, geoms: tuple[int, ...]) -> frozenset[str]:
+    """Quantities that move one of some geoms, or what it hangs on."""
     names = {model.geom(geom).name for geom in geoms}
     bodies = set[str]()
     for body in (int(model.geom_bodyid[geom]) for geom in geoms):
