@@ -4,6 +4,7 @@ import importlib.util
 import json
 import re
 import shlex
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +19,7 @@ from brax.training.acme import running_statistics
 from brax.training.agents.ppo import checkpoint
 
 import mjx_arenas as mja
-from mjx_arenas import cli, envs, policies, settings, train
+from mjx_arenas import brax_bridge, cli, envs, policies, settings, train
 from mjx_arenas.envs.tasks import configured
 from mjx_arenas.files import paths
 from mjx_arenas.problems import messages
@@ -193,6 +194,16 @@ def test_wrong(case, monkeypatch, tmp_path, capsys):
         assert err.startswith(f"error: {says}"), err
         assert "ppo" not in out
     assert not (tmp_path / "out" / "checkpoints").exists()
+
+
+def test_without_brax(monkeypatch, tmp_path):
+    """What needs it says which extra brings it."""
+    monkeypatch.setitem(sys.modules, "brax", None)
+    says = r"^This needs brax: pip install 'mjx_arenas\[train\]'\.$"
+    with pytest.raises(ImportError, match=says):
+        policies.load_policy(tmp_path)
+    with pytest.raises(ImportError, match=says), brax_bridge.device_put_replicated():
+        pass
 
 
 def test_pictures_on_several_devices(monkeypatch, tmp_path, capsys):
