@@ -94,6 +94,6 @@ def _text(spec: mujoco.MjSpec) -> str:
         if element.get("name"):
             element.set("size", " ".join(f"{x:.17g}" for x in np.asarray(spec.site(element.get("name")).size)))
     for actuator, element in zip(spec.actuators, root.iterfind("actuator/*"), strict=True):
-        if element.tag == "general" and actuator.biasprm[2] > 0:
+        if specs.has_dampratio(actuator):
             element.set("biasprm", " ".join(f"{x:.17g}" for x in actuator.biasprm))
     return ElementTree.tostring(root, encoding="unicode")

@@ -298,10 +298,8 @@ def written(scene: Scene, params: ArenaParams) -> mujoco.MjModel:
 
 
 def _ratios(spec: mujoco.MjSpec) -> tuple[int, ...]:
-    """Ids of the position servos with a `dampratio`, which a spec has as a positive damping."""
-    fixed, affine = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-    servos = [a.gaintype == fixed and a.biastype == affine and a.gainprm[0] == -a.biasprm[1] for a in spec.actuators]
-    return tuple(i for i, a in enumerate(spec.actuators) if servos[i] and a.biasprm[2] > 0)
+    """Ids of the position servos with a `dampratio`."""
+    return tuple(i for i, actuator in enumerate(spec.actuators) if specs.has_dampratio(actuator))
 
 
 # Absence.

@@ -356,6 +356,13 @@ def _found_at(spec: mujoco.MjSpec, path: str, item: Item | None) -> dict[tuple[s
     return found
 
 
+def has_dampratio(actuator: mujoco.MjsActuator) -> bool:
+    """Whether an actuator is a position servo with a `dampratio`, which a spec has as a positive damping."""
+    fixed, affine = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servo = actuator.gaintype == fixed and actuator.biastype == affine and actuator.gainprm[0] == -actuator.biasprm[1]
+    return bool(servo and actuator.biasprm[2] > 0)
+
+
 def to_xml(spec: mujoco.MjSpec) -> str:
     """MJCF of a compiled spec, in full precision where this MuJoCo can say how many digits it writes, else with six."""
     library = _library()
