@@ -1,6 +1,6 @@
 """Tendons that have no spring in any world, whose springs' lengths the compiler would take anew in each (host)."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ from mjx_arenas.terms.elements import Elements
 _STIFF = ("tendon.stiffness", "tendon.stiffnesspoly")
 
 
-def keep(spec: mujoco.MjSpec, varied: Iterable[Elements]) -> mujoco.MjSpec:
+def keep(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> mujoco.MjSpec:
     """Gives tendons that have no spring in any world the nominal length of one, which no step reads.
 
     The compiler takes this length from where the tendon's ends stand at `qpos0`, if the MJCF has no `springlength`.
@@ -20,7 +20,6 @@ def keep(spec: mujoco.MjSpec, varied: Iterable[Elements]) -> mujoco.MjSpec:
         spec: in which the terms' elements were prepared; changed, and returned.
         varied: all terms of the arena.
     """
-    varied = tuple(varied)
     sprung = {name for one in varied if one.attribute in _STIFF for name in one.elements}
     measured = [i for i, tendon in enumerate(spec.tendons) if tendon.springlength[0] < 0]
     slack = [i for i in measured if not np.any(spec.tendons[i].stiffness) and spec.tendons[i].name not in sprung]
