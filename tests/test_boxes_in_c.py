@@ -5,9 +5,15 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+
+pytest.importorskip("mujoco_playground")
+
+from models import ROBOTS
 from mujoco import mjx
 
 import mjx_arenas as mja
+from mjx_arenas import envs
+from mjx_arenas.envs import Lift, PickAndPlace
 
 POSES, ROOM = 40, 16  # poses; contacts of one pose
 FLAT, TILTED = (0.005, 5e-4), (0.12, 5e-3)  # how far the upper box is tilted [rad], and how deep it is in the lower [m]
@@ -70,3 +76,13 @@ def test_boxes_in_c(stands, differ):
     counts = [(len(ours), len(theirs)) for ours, theirs in zip(on_warp, c, strict=True)]
     assert max(ours for ours, _ in counts) <= 4 < max(theirs for _, theirs in counts)
     assert differ in counts
+
+
+@pytest.mark.parametrize(
+    ("task", "arm"), [(Lift, "small"), (PickAndPlace, "small"), (PickAndPlace, "yam"), (Lift, "panda")]
+)
+def test_tasks_have_them(task, arm, monkeypatch):
+    """Tasks whose arms hold boxes have C's contacts of them, whatever the options of the arm are."""
+    monkeypatch.syspath_prepend(ROBOTS)
+    model = task(arm=getattr(envs.arms, arm)()).mj_model
+    assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_NATIVECCD

@@ -318,7 +318,8 @@ def test_configurations(task, capsys):
         for pixels in (False, True):
             config = settings.configuration(settings.settled(data, gpu, pixels), "warp", pixels)
             assert settings.problem(config, 1) is None
-            assert settings.learner(config)["num_envs"] == ((4096 if pixels else 8192) if gpu else 64)
+            states = 2048 if task == "pick_and_place" else 8192
+            assert settings.learner(config)["num_envs"] == ((4096 if pixels else states) if gpu else 64)
     assert cli.main(["train", task, "--show"]) == 0
     shown = capsys.readouterr().out
     assert f"task: {task}" in shown
