@@ -17,7 +17,7 @@ from mjx_arenas import gpu as gpu_
 from mjx_arenas.parser import Parser
 
 RESULTS = pathlib.Path(__file__).parent / "results"
-OTHERS = "devices, training and when_needed are benchmarks with options of their own: mjx-arenas bench training --help."
+OTHERS = "box_contacts, devices, training and when_needed are benchmarks with options of their own: mjx-arenas bench training --help."
 
 
 def main(argv: Sequence[str] | None = None) -> int:

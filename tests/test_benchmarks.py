@@ -15,11 +15,12 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
-from benchmarks import kitchen
+from benchmarks import box_contacts, kitchen
 from benchmarks import when_needed as benchmark
 from benchmarks.__main__ import merge, run, targets
 from benchmarks.case import SIZES, Case
 from benchmarks.cases import CASES
+from mjx_arenas import settings
 
 pytestmark = pytest.mark.slow
 
@@ -215,3 +216,20 @@ def test_failed_case_leaves_earlier_results(tmp_path):
     assert json.loads(path.read_text()) == {"kinds": good, "mjlab": {"rows": [], "skipped": "not installed"}}
     merge(path, {"kinds": {"rows": []}})
     assert json.loads(path.read_text())["kinds"] == {"rows": []}
+
+
+def test_box_contacts(tmp_path):
+    """A task's arena keeps Warp's own contacts of boxes in one way, and has C's in the other; what has neither is refused."""
+    pytest.importorskip("mujoco_playground")
+    for task in ("lift", "pick_and_place", "push"):
+        config = settings.configuration(
+            settings.settled(settings.read(settings.find(task)), False, False), "jax", False
+        )
+        (tmp_path / task).mkdir()
+        (tmp_path / task / "config.json").write_text(json.dumps(config))
+    for task in ("lift", "pick_and_place"):
+        for way, as_in_c in (("native", False), ("as_in_c", True), ("native", False)):
+            flags = box_contacts.environment(tmp_path / task, way).mj_model.opt.disableflags
+            assert bool(flags & box_contacts.NATIVE) == as_in_c
+    with pytest.raises(ValueError, match=r"push is no training of lift or pick_and_place in their own arenas\.$"):
+        box_contacts.environment(tmp_path / "push", "as_in_c")

@@ -10,7 +10,7 @@ import click
 from mjx_arenas.cli import options
 
 ROOT = pathlib.Path(__file__).parents[2]
-OTHERS = ("devices", "training", "when_needed")
+OTHERS = ("box_contacts", "devices", "training", "when_needed")
 
 
 @click.command(
@@ -22,8 +22,8 @@ OTHERS = ("devices", "training", "when_needed")
 def bench(arguments: tuple[str, ...]) -> int:
     """Measure what mjx_arenas costs, in a clone of its repository.
 
-    NAMEs are cases, of which --list has a list; without any, all are run. `devices`, `training` and `when_needed` are benchmarks with
-    options of their own (mjx-arenas bench training --help).
+    NAMEs are cases, of which --list has a list; without any, all are run. `box_contacts`, `devices`, `training` and `when_needed` are
+    benchmarks with options of their own (mjx-arenas bench training --help).
     """
     if not (ROOT / "benchmarks" / "__main__.py").is_file():
         raise click.UsageError(
