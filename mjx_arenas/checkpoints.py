@@ -106,12 +106,11 @@ class Stage:
         Returns:
             Its line of the log; None: the policy was evaluated before the interruption.
         """
-        if steps > self.steps:
+        if learned := steps > self.steps:
             (saved,) = self.new.glob("*")
             saved.rename(self.new / "params")
             self.rounds += 1
             shutil.rmtree(self._folder(self.rounds), ignore_errors=True)  # if it could not be read
-            self.new.rename(self._folder(self.rounds))
         else:  # DAgger saves the policy with which it begins, too
             shutil.rmtree(self.new, ignore_errors=True)
             if self.rounds:
@@ -120,6 +119,8 @@ class Stage:
         at = {"stage": self.number, "start": self._start, "round": self.rounds, "steps": steps}
         line = self._lines[self.rounds] = {**at, "time": time.time(), **numbers}
         self._write()
+        if learned:  # a line without a checkpoint is written again, and a checkpoint without a line would be refused
+            self.new.rename(self._folder(self.rounds))
         return line
 
     def _write(self) -> None:

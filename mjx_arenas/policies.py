@@ -115,7 +115,9 @@ def load_policy(folder: str | os.PathLike) -> "TrainedPolicy":
     sizes = {name: mean.shape for name, mean in params[0].mean.items()}
     network = networks(config)(sizes, saved["action_size"], prepared)
     act, key = bc_networks.make_inference_fn(network)(params, tanh_squash=True), _observed(config)
-    return TrainedPolicy(act, config["task"], {n: x for n, x in sizes.items() if n == key or n.startswith("pixels/")})
+    pictures = saved["observation_size"].items() if settings.sees_pictures(config) else ()  # which nothing normalizes
+    views = {name: tuple(size) for name, size in pictures if name.startswith("pixels/")}
+    return TrainedPolicy(act, config["task"], {key: sizes[key], **views})
 
 
 def _around(folder: pathlib.Path) -> str:

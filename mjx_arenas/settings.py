@@ -197,7 +197,7 @@ def settled(data: Mapping[str, Any], gpu: bool, pixels: bool) -> dict[str, Any]:
     """The configuration for a machine with or without a GPU, and for policies that see numbers or pictures."""
     found = {name: x for name, x in data.items() if name not in _OVERLAYS}
     layers = [data, data.get("pixels", {})] if pixels else [data]
-    for layer in layers:
+    for layer in layers[1:]:
         found = merged(found, {name: x for name, x in layer.items() if name not in _OVERLAYS}, "pixels")
     for layer in () if gpu else layers:
         found = merged(found, layer.get("cpu", {}), "cpu")

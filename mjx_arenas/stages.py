@@ -19,7 +19,16 @@ Report = Callable[[int, Any], None]
 _OF_WHERE = ("progress_fn", "seed", "save_checkpoint_path", "restore_checkpoint_path")
 _OWN = {
     "ppo": (
-        *("environment", "episode_length", "action_repeat", "wrap_env_fn", "run_evals", "log_training_metrics"),
+        *(
+            "environment",
+            "eval_env",
+            "episode_length",
+            "action_repeat",
+            "wrap_env_fn",
+            "run_evals",
+            "log_training_metrics",
+        ),
+        "normalize_observations_mode",  # which checkpoints do not keep
         *_OF_WHERE,
     ),
     "dagger": (
@@ -137,8 +146,12 @@ def ppo(env: Any, config: dict[str, Any], report: Report, left: tuple[int, int] 
 
     from mjx_arenas import brax_bridge
     from mjx_arenas.envs import evaluate
+    from mjx_arenas.envs.tasks import configured
 
     given = dict(config["ppo"])
+    if callable(getattr(env, "ranges", None)):  # a world begins at the first level, also when a policy is judged
+        whole = {"arenas": config["arenas"], **configured.LAST_LEVEL}
+        given["eval_env"] = configured.environment(config, overrides=whole)
     del given["network_factory"]
     given["num_timesteps"], given["num_evals"] = left or (steps_of_stage(config), given["num_evals"])
     given.setdefault("batch_size", given["num_envs"] // given["num_minibatches"])

@@ -17,6 +17,7 @@ from sliding import LENGTH, RANGES, SLIDE, Slide, keys, slide
 
 import mjx_arenas as mja
 from mjx_arenas.envs import ArenaEnv, BraxEnv, env_config, refusals
+from mjx_arenas.envs.evaluate import HELD_OUT, UNSEEN, _actions
 from mjx_arenas.envs.trained_policy import TrainedPolicy
 
 
@@ -403,13 +404,30 @@ def test_milliseconds():
 def test_arenas_that_were_drawn_once_are_told():
     for setting, settled in (("num_arenas", 0), ("settled", 2)):
         env = Still()
-        env.pool, env.config = (), types.SimpleNamespace(settled=settled)
+        env.pool, env.config = (), config_dict.create(settled=settled, drawn_seed=0)
         with pytest.warns(UserWarning, match="^The arenas are no new ones") as told:
             mja.evaluate(policy(2, 1), env, 2)
         assert str(told[0].message) == (
             "The arenas are no new ones: `env` draws them once, and takes one of these in each of the 2 worlds. With "
             f"`config.{setting}` set to 0 they are new."
         )
+        env.config.drawn_seed = UNSEEN[0]  # as in the judgement of a training
+        mja.evaluate(policy(2, 1), env, 2)
+
+
+def test_keys_of_policies():
+    """They are none of those from which worlds and episodes are drawn."""
+    keys, seen = jax.random.split(jax.random.key(HELD_OUT), 2), []
+
+    def told(obs, key):
+        seen.append(key)
+        return jnp.zeros((2, 1)), {}
+
+    for t in range(4):
+        _actions(told, {"state": jnp.zeros((2, 1))}, keys, t, None)
+    drawn = [one for n in (2, 3, 4) for one in jax.random.split(keys[0], n)]
+    numbers = {tuple(jax.random.key_data(key).tolist()) for key in (*seen, *drawn)}
+    assert len(numbers) == 4 + len({tuple(jax.random.key_data(key).tolist()) for key in drawn})
 
 
 def test_wrong_judgements():

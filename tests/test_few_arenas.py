@@ -11,7 +11,7 @@ import pytest
 
 import mjx_arenas as mja
 from mjx_arenas.envs import pools
-from mjx_arenas.envs.evaluate import HELD_OUT
+from mjx_arenas.envs.evaluate import HELD_OUT, UNSEEN
 from mjx_arenas.envs.tasks import configured
 
 RANGES = mja.ArenaRanges(table_offsets=mja.Uniform([-0.2, -0.2, 0.7], [0.2, 0.2, 0.9]))
@@ -81,13 +81,16 @@ def test_policies_are_judged_on_others(task):
 @pytest.mark.parametrize("seed", [0, HELD_OUT])
 def test_policies_are_judged_in_other_worlds(monkeypatch, seed):
     """Trainings in worlds that are drawn once are judged in those of another seed."""
-    monkeypatch.setattr(pools, "pool", lambda *_: pools.Pool(None, None))
-    config = {"task": "push", "impl": "jax", "env": {"config": {"settled": 4, "drawn_seed": seed}}}
+    drawn = []
+    monkeypatch.setattr(pools, "pool", lambda *args: drawn.append(args[3].settled) or pools.Pool(None, None))
+    config = {"task": "push", "impl": "jax", "env": {"config": {"settled": 4, "drawn_seed": seed}}, "eval_worlds": 9}
     seeds = [
         configured.environment(config, where).config.drawn_seed for where in ("training", "held_out", "out_of_range")
     ]
     assert seeds[0] == seed
     assert seeds[1] == seeds[2] != seed
+    assert {*seeds[1:]} <= {*UNSEEN}
+    assert drawn == [4, 9, 9]  # each once, and as many as are judged
 
 
 def test_none_of_them_is_valid():

@@ -110,6 +110,27 @@ def test_goes_on_within_a_stage(stage, when, brax, tmp_path):
     assert brax.calls[0] == (stage, 40 - of_stage, 5 - of_stage // 10, f"{stage} {of_stage // 10}")
 
 
+@pytest.mark.parametrize("k", [1, 3])
+def test_between_a_line_and_its_checkpoint(k, brax, tmp_path, monkeypatch):
+    """A line whose checkpoint has not its name yet is written again; nothing is refused, as of the first line of all."""
+    rename = pathlib.Path.rename
+
+    def stopped(path, target):
+        if pathlib.Path(target).name == f"round{k}":
+            raise Killed
+        return rename(path, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pathlib.Path, "rename", stopped)
+        killed(tmp_path)
+    if k == 1:  # as with one evaluation alone
+        log = tmp_path / "progress.jsonl"
+        log.write_text("".join(line + "\n" for line in log.read_text().splitlines() if json.loads(line)["round"]))
+    brax.calls.clear()
+    finished(tmp_path, []) if k > 1 else stages.train(CONFIG, tmp_path, lambda *_: None)
+    assert brax.calls[0] == ((0, 20, 3, "0 2") if k == 3 else (0, 40, 5, None))
+
+
 def test_twice(brax, tmp_path):
     """Interrupted again, it goes on again; in the first round, the stage begins again."""
     for at in ((0, 1), (0, 3), (1, 1)):

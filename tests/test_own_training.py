@@ -11,12 +11,13 @@ import pytest
 
 pytest.importorskip("brax")
 
+from brax.training.agents.ppo import train as ppo
 from command import train_main
 from PIL import Image
 from test_train import ARGUMENTS
 
 import mjx_arenas as mja
-from mjx_arenas import judged, policies, settings, train
+from mjx_arenas import judged, policies, settings, stages, train
 from mjx_arenas.envs.tasks import configured
 from mjx_arenas.problems import messages
 from mjx_arenas.viz import render
@@ -46,6 +47,10 @@ def plain(config_overrides, ranges=RANGES):
 
 def curriculum(config_overrides, ranges=RANGES, vision=None):
     return Slide(ranges=lambda level: ranges, objects=(), **config_overrides)
+
+def climbing(config_overrides):
+    given = {"level": 0.1, "level_step": 0.2} | config_overrides
+    return Slide(ranges=lambda level: mja.ArenaRanges(table_rots=mja.Uniform(0.5 * level, level)), objects=(), **given)
 
 def lift(config_overrides, **given):
     return envs.Lift(config_overrides=config_overrides, **given)
@@ -173,6 +178,27 @@ def test_judged_on_new_arenas(own, mine):
         assert env.config.arenas == "every_episode"
     assert policies.load_env(mine, {"arenas": "fixed"}).config.arenas == "fixed"
     assert configured.environment(config, overrides={"arenas": "nominal"}).config.arenas == "nominal"
+
+
+def test_a_curriculum_is_judged_as_a_whole(mine, monkeypatch):
+    """Policies are judged at its last level, in training and afterwards, although worlds begin at the first one."""
+    sys.path.insert(0, str(mine))
+    given = {}
+    monkeypatch.setattr(ppo, "train", lambda **arguments: given.update(arguments))
+    for task, level in (("mine:climbing", 0.1), ("mine:slide", 0.0)):
+        config = settings.configuration(settings.settled(settings.read(task), False, False), "jax", False)
+        env, held_out = configured.environment(config), configured.environment(config, "held_out")
+        assert (env.config.level, held_out.config.level, held_out.config.level_step) == (level, 1.0, 0.0)
+        given.clear()
+        stages.ppo(env, config, lambda *_: None)
+        assert given["environment"] is env
+        judges = given.get("eval_env", held_out)
+        assert (judges.config.level, judges.config.level_step) == (1.0, 0.0)
+        assert ("eval_env" in given) == (task == "mine:climbing")
+    asked = configured.environment(
+        settings.settled(settings.read("mine:climbing"), False, False) | {"impl": "jax"}, "held_out", {"level": 0.5}
+    )
+    assert asked.config.level == 0.5
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import sys
 import jax
 import jax.numpy as jnp
 import models
+import numpy as np
 import pages
 import pytest
 from command import train_main
@@ -111,6 +112,10 @@ WRONG = {
     "of nothing": (["--set", "seed.x=1"], "--set: `seed` must be like 0, got {'x': 1}."),
     "no arm": (["--arm", "small"], "`env` of the task push may have config, got arm."),
     "not of PPO": (["--set", "ppo.momentum=1"], "`ppo` must have arguments of Brax's PPO, got momentum."),
+    "not kept": (
+        ["--set", "ppo.normalize_observations_mode=ema"],
+        "`ppo` must not have normalize_observations_mode, which a training decides by itself.",
+    ),
     "not of the networks": (
         ["--set", "ppo.network_factory.policy_hidden_sizes=[8]"],
         "`ppo.network_factory` must have arguments of Brax's make_ppo_networks, got policy_hidden_sizes: did you mean "
@@ -400,6 +405,22 @@ def test_ranges_of_tasks():
         assert one.ranges != other.ranges
 
 
+def test_wider_ranges_lie_outside():
+    """What the file of a training names stays as in training; where nothing of the task's wider ranges is left, nothing is judged."""
+    wide = {"LogUniform": {"low": [0.2, 0.005, 0.0001], "high": [1.2, 0.005, 0.0001]}}
+    config = {"task": "lift", "impl": "jax", "sees": "numbers", "ranges": {"table_frictions": wide}}
+    one, other = (configured.environment(config, where).ranges for where in ("training", "out_of_range"))
+    assert one.table_frictions == other.table_frictions == mja.LogUniform(*wide["LogUniform"].values())
+    assert one.object_masses != other.object_masses
+    config["wider_ranges"] = {"table_frictions": {"Fixed": [0.1, 0.005, 0.0001]}}
+    assert isinstance(configured.environment(config, "out_of_range").ranges.table_frictions, mja.Fixed)
+    every = {name: {"Fixed": 0.5} for name in ("table_rots",)}
+    start = {"terms": {"arm_start": {"Uniform": [-0.1, 0.1]}}}
+    offsets = {"table_offsets": {"Uniform": {"low": [0, 0, 0], "high": [0, 0, 0.1], "relative": "add"}}}
+    config = {"task": "reach", "impl": "jax", "sees": "numbers", "ranges": every | start | offsets}
+    assert configured.environment(config, "out_of_range") is None
+
+
 def test_vision_of_an_older_training():
     """What a new one may not say is no reason not to judge what was trained with it."""
     config = {"task": "reach", "impl": "jax", "sees": "numbers", "env": {"config": {"vision": True}}}
@@ -426,9 +447,17 @@ def test_what_a_policy_reads(sees, given, tmp_path):
     (tmp_path / "config.json").write_text(json.dumps(config))
     policy = policies.load_policy(tmp_path)
     read = given.get("policy_obs_key", "privileged_state" if sees == "everything" else "state")
-    assert {name for name in policy.sees if not name.startswith("pixels/")} == {read}
+    views = {name: size for name, size in sizes.items() if name.startswith("pixels/")}
+    assert policy.sees == {read: sizes[read], **views}
     only = {name: jnp.zeros((3, *sizes[name])) for name in policy.sees}
     assert policy(only, jax.random.key(0))[0].shape == (3, 1)
+    more = only | {"pixels/view_1": jnp.ones((3, 16, 16, 3))}
+    np.testing.assert_array_equal(policy(more, jax.random.key(0))[0], policy(only, jax.random.key(0))[0])
+    for name in views:
+        with pytest.raises(
+            ValueError, match=r"the policy \(16, 16, 3\) numbers as 'pixels/view_0', .*got \(24, 24, 3\)"
+        ):
+            policy(only | {name: jnp.zeros((3, 24, 24, 3))}, jax.random.key(0))
 
 
 def test_looks_of_a_configuration():

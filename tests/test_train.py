@@ -504,8 +504,9 @@ def test_tasks(tiny, tmp_path, monkeypatch, capsys):
     assert "task lift instead of push" in capsys.readouterr().err
 
 
-def test_success_at_the_end():
-    """It is told in the last step of a whole episode alone."""
+@pytest.mark.parametrize("rounded", [1.0, 0.8])
+def test_success_at_the_end(rounded):
+    """It is told in the last step of a whole episode alone, whatever rounding makes of times, as it does of long episodes."""
 
     class Slow(Slide):
         def score(self, data, episode, action):
@@ -517,4 +518,5 @@ def test_success_at_the_end():
     for _ in range(LENGTH):
         state = step(state, jnp.array([[0.0], [1.0]]))
         told.append([state.metrics[name].tolist() for name in ("success", "success_at_end")])
+        state = state.replace(data=state.data.replace(time=rounded * state.data.time))
     assert told == [[[1, 1], [0, 0]], [[1, 0], [0, 0]], [[1, 0], [1, 0]]]

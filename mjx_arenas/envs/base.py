@@ -96,8 +96,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         check_type("ranges", ranges, (ArenaRanges, Callable), "ArenaRanges or a function of a level")  # type: ignore[arg-type]
         refusals.check_methods(self, ArenaEnv)
         arena.spec.option.timestep = chosen.sim_dt
-        self.arena = arena
-        self.ranges = ranges
+        self.arena, self.ranges = arena, ranges
         self._levels = [self._ranges_at(jnp.float32(level)) for level in ((0, 1) if callable(ranges) else (0,))]
         for at in self._levels:
             arena.sample_params(world_keys(0, [0])[0], at)  # says what is wrong with the ranges
@@ -176,11 +175,11 @@ class ArenaEnv(mjx_env.MjxEnv):
         reward, _, metrics = self._scored(data, episode, jnp.zeros(self.action_size))
         false = jnp.zeros((), bool)
         info = {"rng": rng, "level": level, "episode": episode, "next_episode": episode}
-        info |= dict.fromkeys(("ready", "started", "succeeded"), false)
+        info |= {"step": jnp.zeros((), jnp.int32), **dict.fromkeys(("ready", "started", "succeeded"), false)}
         obs = self._observed(data, episode)
         if self._eyes is not None:
             info |= {"drawn_steps": jnp.zeros((), jnp.int32), "unseen": false}
-            obs |= self._eyes.first(self._now(model, data, episode))
+            obs |= self._eyes.first(self._now(model, data, episode, info["step"]))
         zeros = dict.fromkeys({**_REPORTS, **metrics}, jnp.zeros((), jnp.float32))
         return State(data, obs, jnp.zeros_like(reward), jnp.zeros_like(reward), zeros, info)
 
@@ -191,6 +190,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         begins = self.begins(state)
         moved = jnp.where(info["succeeded"], 1.0, -1.0) * float(self._config["level_step"])
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
+        info["step"] = jnp.where(begins, 0, info["step"]) + 1  # times are sums of rounded numbers, and would be others
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
         model = replace(self._mjx_model, episode.fields)
@@ -206,7 +206,7 @@ class ArenaEnv(mjx_env.MjxEnv):
             info["drawn_steps"] = info["drawn_steps"] + 1
             due, new = info["drawn_steps"] % self._eyes.every == 0, begins | info["unseen"]
             info["unseen"] = new & ~due
-            obs |= self._eyes.next(self._now(model, data, episode), state.obs, new, due)
+            obs |= self._eyes.next(self._now(model, data, episode, info["step"]), state.obs, new, due)
         reward, ends, metrics = self._scored(data, episode, action)
         numbers = jax.tree.leaves((data.qpos, data.qvel, obs, reward, metrics))
         broken = ~jnp.stack([sound(x).all() for x in numbers]).all()
@@ -214,7 +214,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         failed = not_finite | broken
         reward, metrics = jax.tree.map(lambda x: jnp.where(failed, 0.0, x).astype(jnp.float32), (reward, metrics))
         length: Any = self._config.get("episode_length", jnp.inf)
-        at_end = (metrics["success"] > 0) & (jnp.round(data.time / self.dt) >= length)
+        at_end = (metrics["success"] > 0) & (info["step"] >= length)
         reports = (not_finite, broken, ~episode.valid, dropped_contacts(data), solver_limits(data), at_end)
         reports = {name: jnp.asarray(x, jnp.float32) for name, x in zip(_REPORTS, reports, strict=True)}
         metrics = {**state.metrics, **metrics, **reports}  # wrappers add to them
@@ -300,11 +300,10 @@ class ArenaEnv(mjx_env.MjxEnv):
         refusals.check_privileged(f"{type(self).__name__}.observe", given)
         return {"state": refusals.felt(self, data, episode), "privileged_state": given["privileged_state"]}
 
-    def _now(self, model: mjx.Model, data: mjx.Data, episode: Episode) -> Now:
+    def _now(self, model: mjx.Model, data: mjx.Data, episode: Episode, step: jax.Array) -> Now:
         """What there is to see."""
         lasting, passing = (jax.random.fold_in(episode.key, tag) for tag in _TAGS[1:])
-        step = jax.random.fold_in(passing, jnp.round(data.time / self.dt).astype(jnp.int32))
-        return Now(model, episode.params, data, lasting, step)
+        return Now(model, episode.params, data, lasting, jax.random.fold_in(passing, step))
 
     def _scored(
         self, data: mjx.Data, episode: Episode, action: jax.Array

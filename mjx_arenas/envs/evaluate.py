@@ -22,6 +22,10 @@ from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 
 HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
+UNSEEN = (
+    HELD_OUT,
+    HELD_OUT + 1,
+)  # seeds of worlds that are drawn once to judge policies on, of which a training has one at most
 MANY = 0.1  # share of worlds of which something is reported, from which on a warning says so
 Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 _CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
@@ -66,7 +70,8 @@ def evaluate(
     Args:
         policy: `policy(observations, key)` returns actions (W, n) and extra information, like the policies of Brax and
             `policies.load_policy`. It is traced, also for C, and so computes with `jax.numpy` and draws with its key.
-        env: an `ArenaEnv`. With `engine=None` it may be any environment with the same metrics.
+        env: an `ArenaEnv`; its worlds are of its configuration's `level`. With `engine=None` it may be any environment with the same
+            metrics.
         n_worlds: number of worlds W.
         seed: seed of the arenas, and of the keys that the policy gets, another one in each step.
         engine: None: MJX, as in the environment. "c": C MuJoCo on the recompiled worlds, on all cores. What is absent in a world is not
@@ -78,8 +83,8 @@ def evaluate(
             possible, or contacts were dropped. `solver_limits`: the solver stopped at the limit of its iterations.
 
     Warns:
-        UserWarning: `env` draws its arenas once, so that a training may have seen them; or something is reported of at least a tenth of the
-            worlds, so that the shares say little about the policy.
+        UserWarning: `env` draws its arenas once, with the seed of a training, which may have seen them; or something is reported of at
+            least a tenth of the worlds, so that the shares say little about the policy.
 
     Raises:
         ValueError, TypeError: an argument is invalid, or the policy does not return what it must, computes with NumPy, or was trained
@@ -89,7 +94,7 @@ def evaluate(
     if engine not in (None, "c"):
         raise validation.error([problem("engine", "must", None, engine, must="None (that of the environment) or 'c'")])
     _check(policy, env, seed, engine)
-    if getattr(env, "pool", None) is not None:
+    if getattr(env, "pool", None) is not None and env.config.get("drawn_seed") not in UNSEEN:
         setting = "`config.settled`" if env.config.settled else "`config.num_arenas`"
         warn(problem("env", "judged_on_drawn", None, None, {"of": n_worlds, "setting": setting}))
     keys = jax.random.split(jax.random.key(seed), n_worlds)
@@ -192,12 +197,17 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
     return run(keys)
 
 
+_TAG = (
+    0x504F4C49  # large, because `jax.random.split` of a world's key gives the keys that `fold_in` gives of 0, 1, 2, ...
+)
+
+
 def _actions(policy: Policy, obs: Any, keys: jax.Array, t: Any, env: Any) -> jax.Array:
     """(W, n) what the policy does in W worlds in step t."""
     if isinstance(policy, TrainedPolicy):
         policy.check(obs, "env")
     try:
-        given = policy(obs, jax.random.fold_in(keys[0], t))
+        given = policy(obs, jax.random.fold_in(jax.random.fold_in(keys[0], _TAG), t))
     except (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError) as error:
         raise validation.error([problem("policy", "policy_traced")], kind=TypeError) from error
     if not isinstance(given, tuple) or len(given) != 2:
@@ -239,6 +249,7 @@ def _judged(
 def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
     """The same steps as `ArenaEnv.step` takes, with C MuJoCo in the place of MJX."""
     flaws: Any = getattr(env, "flaws", None)  # delays and noise
+    begins = jnp.zeros((), bool)  # no world begins another episode
     first = jax.jit(jax.vmap(env.reset))(keys)
     episodes = first.info["episode"]
     start = data_.blank(env.mj_model)
@@ -254,13 +265,13 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         }
         return {name: jnp.asarray(x, getattr(start, name).dtype) for name, x in read.items()}
 
-    def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
+    def look(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, t: Any) -> Any:
         data = start.replace(**values)
         obs, *judged = _judged(env, data, episode, action)
         late, obs = flaws.see(late, obs, begins, episode, t + 1) if flaws else (late, obs)
         return late, obs, *judged
 
-    def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, begins: Any, t: Any) -> Any:
+    def drive(values: dict[str, jax.Array], episode: Episode, action: jax.Array, late: Any, t: Any) -> Any:
         late, action = flaws.act(late, action, begins, episode, t) if flaws else (late, action)
         wrong, data = ~jnp.isfinite(action).all(), env.mark(start.replace(**values), episode)
         action = jnp.where(wrong, env.neutral_action, jnp.clip(action, -1.0, 1.0))
@@ -268,25 +279,23 @@ def _in_c(env: ArenaEnv, policy: Policy, keys: jax.Array) -> Log:
         return late, action, moved, wrong
 
     @jax.jit
-    def act(obs: Any, values: dict[str, jax.Array], late: Any, begins: Any, t: Any) -> tuple[Any, ...]:
+    def act(obs: Any, values: dict[str, jax.Array], late: Any, t: Any) -> tuple[Any, ...]:
         actions = _actions(policy, obs, keys, t, env)
-        return jax.vmap(drive, (0, 0, 0, 0, 0, None))(values, episodes, actions, late, begins, t)
+        return jax.vmap(drive, (0, 0, 0, 0, None))(values, episodes, actions, late, t)
 
     def move(w: int, moved: dict[str, np.ndarray]) -> None:
         worlds[w].move({name: x[w] for name, x in moved.items()}, env.n_substeps)
 
-    score, log, obs = jax.jit(jax.vmap(look, (0, 0, 0, 0, 0, None))), [], first.obs
-    late, begins = first.info.get("late"), jax.vmap(env.begins)(first)
-    values = gathered()
+    score, log, obs = jax.jit(jax.vmap(look, (0, 0, 0, 0, None))), [], first.obs
+    late, values = first.info.get("late"), gathered()
     invalid, impossible = ~np.asarray(episodes.valid), np.asarray(_impossible(first))
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         for t in map(np.int32, range(episode_length(env))):
-            late, actions, moved, wrong = act(obs, values, late, begins, t)
+            late, actions, moved, wrong = act(obs, values, late, t)
             moved = jax.tree.map(np.asarray, moved)
             list(threads.map(lambda w, moved=moved: move(w, moved), range(len(worlds))))
             values = gathered()
-            late, obs, ends, success, broken = score(values, episodes, actions, late, begins, t)
-            begins = jnp.zeros_like(begins)
+            late, obs, ends, success, broken = score(values, episodes, actions, late, t)
             unsound = np.array([one.broken for one in worlds]) | np.asarray(broken)
             wrong, never = np.asarray(wrong), np.zeros_like(unsound)
             ended = np.asarray(ends) | unsound | wrong

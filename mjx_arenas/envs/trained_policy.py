@@ -22,7 +22,7 @@ class TrainedPolicy:
 
     def __call__(self, observation: Any, key: jax.Array) -> tuple[jax.Array, Mapping]:
         self.check(observation, "observation")
-        return self.act(observation, key)
+        return self.act({name: observation[name] for name in self.sees}, key)
 
     def check(self, observation: Any, path: str) -> None:
         """Refuses observations (..., m) of other names or sizes than those of the training; `path` is the argument that gives them."""

@@ -69,24 +69,36 @@ def environment(
     Args:
         config: of a training: `task`, `env`, `ranges`, `wider_ranges`, `impl` and `sees`.
         where: "training", "held_out", the same ranges with other seeds, or "out_of_range". The arenas of the last two are new in every
-            episode and not limited in number (`num_arenas`), and worlds that are drawn once (`settled`) are others than in training,
-            unless `overrides` say so.
+            episode and not limited in number (`num_arenas`), those of a curriculum are of its last level, and worlds that are drawn once
+            (`settled`) are others than in training, and at least as many as are judged, unless `overrides` say so.
         overrides: of the environment's configuration, dotted names and values.
 
     Returns:
-        None where an arena or a task of a user's own has no ranges beyond those of training.
+        None where there are no ranges beyond those of training, as of an arena or a task of a user's own.
 
     Raises:
         ValueError: the task does not take an argument in `env`, or a task or an arm cannot be imported; as of the task, and of files.
     """
-    asked = {} if where == "training" else {"arenas": "every_episode"}
-    asked |= overrides or {}
+    if where == "training":
+        return _environment(config, where, overrides or {})
+    asked = {"arenas": "every_episode", **LAST_LEVEL, **(overrides or {})}
+    asked = _unseen(config, (config.get("env") or {}).get("config") or {}) | asked
     env = _environment(config, where, asked)
-    if where == "training" or env is None or env.pool is None:
+    if env is None or (unseen := _unseen(config, env.config)).keys() <= asked.keys():
         return env
-    seed = env.config.get("drawn_seed")
-    unseen = {"num_arenas": 0} if env.config.get("num_arenas") else {"drawn_seed": HELD_OUT + (seed == HELD_OUT)}
-    return env if {*unseen} <= {*asked} else _environment(config, where, {**unseen, **asked})
+    return _environment(config, where, {**unseen, **asked})  # a task of a user's own draws worlds once by itself
+
+
+LAST_LEVEL: Mapping[str, Any] = {"level": 1.0, "level_step": 0.0}
+"""What an environment's configuration says for the whole ranges of a curriculum in every episode."""
+
+
+def _unseen(config: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """What makes worlds new that an environment's configuration draws once."""
+    if worlds := chosen.get("settled"):
+        seed = HELD_OUT + (chosen.get("drawn_seed") == HELD_OUT)
+        return {"drawn_seed": seed, "settled": max(worlds, config.get("eval_worlds", 0))}
+    return {"num_arenas": 0} if chosen.get("num_arenas") else {}
 
 
 def _environment(config: Mapping[str, Any], where: str, overrides: Mapping[str, Any]) -> ArenaEnv | None:
@@ -107,7 +119,10 @@ def _environment(config: Mapping[str, Any], where: str, overrides: Mapping[str, 
         (given["arena"], base), wider = _arena(config, path), ArenaRanges()
         n_objects = len(given["arena"].objects)
     wrist = "arm" in chosen.takes
-    ranges, seen = _seen(config, given, _ranges(config, where, base, wider), n_objects, wrist)
+    asked = _ranges(config, where, base, wider)
+    if where == "out_of_range" and asked == _ranges(config, "held_out", base):
+        return None
+    ranges, seen = _seen(config, given, asked, n_objects, wrist)
     return chosen.kind(ranges=ranges, **given, **seen)
 
 
@@ -215,11 +230,14 @@ def _seen(
 
 
 def _ranges(config: Mapping[str, Any], where: str, base: ArenaRanges, wider: ArenaRanges | None = None) -> ArenaRanges:
-    """Ranges of a task or a file with those of a configuration, and outside of these `wider` ones, over them."""
-    ranges = _over(base, load.ranges(config.get("ranges") or {}, "`ranges`"))
+    """Ranges of a task or a file with those of a configuration, and outside of these the task's `wider` ones and the configuration's.
+
+    Of what the configuration's own ranges name, the task does not know what lies outside.
+    """
+    own = load.ranges(config.get("ranges") or {}, "`ranges`")
     if where != "out_of_range":
-        return ranges
-    ranges = _over(ranges, wider or ArenaRanges())
+        return _over(base, own)
+    ranges = _over(_over(base, wider or ArenaRanges()), own)
     return _over(ranges, load.ranges(config.get("wider_ranges") or {}, "`wider_ranges`"))
 
 

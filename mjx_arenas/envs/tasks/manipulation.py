@@ -242,7 +242,7 @@ class ArmTask(ArenaEnv):
         if self.flaws is None:
             return state
         late = self.flaws.start(state.obs)
-        late, obs = self.flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], self._steps(state))
+        late, obs = self.flaws.see(late, state.obs, jnp.ones((), bool), state.info["episode"], state.info["step"])
         return state.replace(obs=obs, info={**state.info, "late": late})
 
     def step(self, state: State, action: jax.Array) -> State:
@@ -250,15 +250,12 @@ class ArmTask(ArenaEnv):
             return super().step(state, action)
         refusals.check_step(state, action, self.action_size)
         begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
-        late, action = self.flaws.act(late, action, begins, state.info["episode"], self._steps(state))
+        taken = jnp.where(begins, 0, state.info["step"])
+        late, action = self.flaws.act(late, action, begins, state.info["episode"], taken)
         # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.
         state = super().step(state.replace(obs=before | {name: x[0] for name, x in late.obs.items()}), action)
-        late, obs = self.flaws.see(late, state.obs, begins, state.info["episode"], self._steps(state))
+        late, obs = self.flaws.see(late, state.obs, begins, state.info["episode"], state.info["step"])
         return state.replace(obs=obs, info={**state.info, "late": late})
-
-    def _steps(self, state: State) -> jax.Array:
-        """() of the episode so far."""
-        return jnp.round(state.data.time / self.dt).astype(jnp.int32)
 
     @property
     def foot(self) -> Foot:

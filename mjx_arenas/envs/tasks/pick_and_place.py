@@ -50,7 +50,7 @@ def default_config() -> config_dict.ConfigDict:
 
 
 def training_ranges() -> ArenaRanges:
-    """Ranges of the heights, places and sizes of two tables, of the object and the obstacle, and of how the arm starts."""
+    """Ranges of the heights, places, yaws and friction of tables, of the object and the obstacle, and of how the arm starts."""
     low, high = [-0.03, -0.02, -0.1], [0.03, 0.02, 0.1]
     return manipulation.training_ranges(
         table_offsets=Uniform([low, low, [0, 0, 0]], [high, high, [0, 0, 0]], relative="add"),
