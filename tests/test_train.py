@@ -492,8 +492,8 @@ def test_tasks(tiny, tmp_path, monkeypatch, capsys):
     made = {"reach": reach, "lift": lift, "pick_and_place": pick_and_place, "open_drawer": open_drawer}
     for module, name in zip(made.values(), ("Reach", "Lift", "PickAndPlace", "OpenDrawer"), strict=True):
         monkeypatch.setattr(module, name, Small)
-        for ranges in ("training_ranges", "wider_ranges"):
-            monkeypatch.setattr(module, ranges, lambda: MOVED)
+        monkeypatch.setattr(module, "training_ranges", lambda: MOVED)
+        monkeypatch.setattr(module, "wider_ranges", lambda: MOVED._replace(table_rots=mja.Uniform(0.5, 0.6)))
     assert {*made, "push"} == {*settings.tasks()}
     for task in made:
         assert train_main(*ARGUMENTS, "--stages", "1", "--out", tmp_path / task, task=task) == 0

@@ -190,7 +190,7 @@ class ArenaEnv(mjx_env.MjxEnv):
         begins = self.begins(state)
         moved = jnp.where(info["succeeded"], 1.0, -1.0) * float(self._config["level_step"])
         info["level"] = jnp.where(begins, jnp.clip(info["level"] + moved, 0.0, 1.0), info["level"])
-        info["step"] = jnp.where(begins, 0, info["step"]) + 1  # times are sums of rounded numbers, and would be others
+        info["step"] = 1 + info["step"] * ~begins  # times are sums of rounded numbers, and would be others
         upcoming, rng, ready = self._prepare(info, begins)
         episode = jax.tree.map(lambda new, old: jnp.where(begins, new, old), upcoming, info["episode"])
         model = replace(self._mjx_model, episode.fields)

@@ -84,16 +84,17 @@ def environment(
     asked = {"arenas": "every_episode", **LAST_LEVEL, **(overrides or {})}
     asked = _unseen(config, (config.get("env") or {}).get("config") or {}) | asked
     env = _environment(config, where, asked)
-    if env is None or (unseen := _unseen(config, env.config)).keys() <= asked.keys():
+    if env is None or env.pool is None:
         return env
-    return _environment(config, where, {**unseen, **asked})  # a task of a user's own draws worlds once by itself
+    unseen = _unseen(config, env.config)  # of a task of a user's own that draws worlds once by itself
+    return env if unseen.keys() <= asked.keys() else _environment(config, where, {**unseen, **asked})
 
 
 LAST_LEVEL: Mapping[str, Any] = {"level": 1.0, "level_step": 0.0}
 """What an environment's configuration says for the whole ranges of a curriculum in every episode."""
 
 
-def _unseen(config: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
+def _unseen(config: Mapping[str, Any], chosen: Any) -> dict[str, Any]:
     """What makes worlds new that an environment's configuration draws once."""
     if worlds := chosen.get("settled"):
         seed = HELD_OUT + (chosen.get("drawn_seed") == HELD_OUT)

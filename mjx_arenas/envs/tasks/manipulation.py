@@ -250,7 +250,7 @@ class ArmTask(ArenaEnv):
             return super().step(state, action)
         refusals.check_step(state, action, self.action_size)
         begins, late, before = self.begins(state), state.info["late"], dict(state.obs)  # type: ignore[arg-type]
-        taken = jnp.where(begins, 0, state.info["step"])
+        taken = state.info["step"] * ~begins
         late, action = self.flaws.act(late, action, begins, state.info["episode"], taken)
         # Pictures that are not drawn anew stay those that were seen last, not those that are on their way.
         state = super().step(state.replace(obs=before | {name: x[0] for name, x in late.obs.items()}), action)
