@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.build import resting, slots
+from mjx_arenas.build import order, resting, slots
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
@@ -216,6 +216,7 @@ def xml_tree(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, ElementTree.Element]:
     """A compiled copy of a spec, whose files have absolute paths, and its MJCF."""
     spec = spec.copy()
     specs.make_paths_absolute(spec, "arena.spec")
+    order.put_frames_in_order(spec)
     spec.compile()
     return spec, ElementTree.fromstring(specs.to_xml(spec))
 

@@ -21,6 +21,12 @@ _WRAPS = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
 
 def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tuple[mujoco.MjSpec, SimplifyReport]:
     """A spec, which is used up, with what was asked for; `model` is compiled of it."""
+    aligns = [(body.joints[0], body.joints[0].align) for body in spec.bodies if masses.aligned(body)]
+    before = cost(model)
+    if aligns:  # the compiler moves these bodies' frames: what is edited is where the spec has it
+        for joint, _ in aligns:
+            joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
+        model = specs.compiled(spec.copy(), "robot")
     shapes = _shapes(model, asked)
     geoms, actuators = ({one.id: one for one in of} for of in (spec.geoms, spec.actuators))  # until the first edit
     away = _away(spec, model, geoms, asked)
@@ -44,13 +50,15 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     specs.assign(spec.option, **asked.options)
     excluded = _exclude(spec, model, asked)
     gone = tuple(model.actuator(i).name for i in asked.gone)
+    for joint, align in aligns:
+        joint.align = align
     after = specs.compiled(spec, "robot")
     reshaped = tuple(
         Reshaped(model.geom(geom).name or specs.geom_name(model, geom), _kind(model, geom), *_now(shapes.get(geom)))
         for geom in asked.shapes
     )
     options = {name: both for name, both in options.items() if not np.array_equal(*both)}
-    return spec, SimplifyReport(cost(model), cost(after), reshaped, excluded, gone, sensors, options)
+    return spec, SimplifyReport(before, cost(after), reshaped, excluded, gone, sensors, options)
 
 
 def cost(model: mujoco.MjModel) -> Cost:
@@ -111,6 +119,7 @@ def _referred(spec: mujoco.MjSpec) -> set[str]:
 def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collection[int]) -> None:
     """Gives the bodies of geoms that change the inertials that the compiler made of their geoms."""
     bodies = set(model.geom_bodyid[sorted(geoms)].tolist()) - {0}
+    bodies &= set(np.flatnonzero(model.body_mass).tolist())  # of the others the compiler makes the same as before
     inferred = [body for body in spec.bodies if body.id in bodies and masses.inferred(body)]
     for body in inferred:
         own = {

@@ -39,3 +39,12 @@ def inferred(body: mujoco.MjsBody) -> bool:
     if rule == rules.mjINERTIAFROMGEOM_AUTO:
         return not body.explicitinertial
     return rule == rules.mjINERTIAFROMGEOM_TRUE
+
+
+def aligned(body: mujoco.MjsBody) -> bool:
+    """Whether the compiler moves a body's frame to its centre of mass, along the principal axes."""
+    joints = body.joints
+    if len(joints) != 1 or joints[0].type != mujoco.mjtJoint.mjJNT_FREE or body.bodies:
+        return False
+    align, rules = joints[0].align, mujoco.mjtAlignFree
+    return bool(align == rules.mjALIGNFREE_TRUE or (align == rules.mjALIGNFREE_AUTO and body.compiler.alignfree))

@@ -96,6 +96,15 @@ def c_batch(record: Record, fields: Mapping[str, jax.Array], start: Mapping[str,
         for k in range(mj_model.nkey):
             own = objects.reshape(-1) if mj_model.key(k).name in record.given.placed else slice(None)
             keys[:, k, own] = np.asarray(fields["qpos0"])[:, own]
+    mocap = np.flatnonzero(mj_model.body_mocapid >= 0)  # in the order of their poses
+    for name, field, own in (
+        ("key_mpos", "body_pos", record.given.led),
+        ("key_mquat", "body_quat", record.given.turned),
+    ):
+        if mj_model.nkey and len(mocap) and field in fields:
+            keys, values = batch.expand(name), np.asarray(fields[field])[:, mocap]
+            for k in (k for k in range(mj_model.nkey) if mj_model.key(k).name not in own):
+                keys[:, k] = values.reshape(keys[:, k].shape)
     batch.set_const()  # what else C MuJoCo derives: the bounding volumes of bodies
     for name, value in start.items():
         setattr(batch, name, np.asarray(value))

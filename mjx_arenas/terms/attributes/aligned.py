@@ -8,18 +8,9 @@ from mjx_arenas.spec import masses
 from mjx_arenas.terms.attributes.attribute import Attribute
 
 _POSES = ("pos", "rpy", "dir")
-_OF_BODY = (*_POSES, "ipos", "payload", "pseudo_inertia")
+_OF_BODY = (*_POSES, "mass", "mass_alone", "inertia", "ipos", "payload", "pseudo_inertia")
 _OF_WEIGHT = ("geom.size", "geom.density", "geom.mass")
 WHY = 'the body is free and aligned with its inertia: set `align="false"` of its free joint'
-
-
-def aligned(body: mujoco.MjsBody) -> bool:
-    """Whether the compiler moves a body's frame to its centre of mass, along the principal axes."""
-    joints = body.joints
-    if len(joints) != 1 or joints[0].type != mujoco.mjtJoint.mjJNT_FREE or body.bodies:
-        return False
-    align, rules = joints[0].align, mujoco.mjtAlignFree
-    return bool(align == rules.mjALIGNFREE_TRUE or (align == rules.mjALIGNFREE_AUTO and body.compiler.alignfree))
 
 
 def refused_on_aligned(attributes: dict[str, Attribute]) -> dict[str, Attribute]:
@@ -36,7 +27,7 @@ def _refused(attribute: str, row: Attribute) -> Attribute:
 
     def refused(spec: mujoco.MjSpec, element: Any) -> str:
         body = element if kind == "body" else element.parent
-        if aligned(body) and (attribute not in _OF_WEIGHT or masses.inferred(body)):
+        if masses.aligned(body) and (attribute not in _OF_WEIGHT or masses.inferred(body)):
             return WHY
         return other(spec, element) if other else ""
 

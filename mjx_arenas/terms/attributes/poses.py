@@ -21,7 +21,7 @@ from mjx_arenas.terms.attributes.attribute import (
     of_model,
     reader,
 )
-from mjx_arenas.terms.attributes.prepare import weighed
+from mjx_arenas.terms.attributes.prepare import not_simple
 
 
 def turned(field: str) -> Callable[[Array, mujoco.MjModel, np.ndarray], Array]:
@@ -105,8 +105,8 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
         quat = of_model(model, f"{prefix}_quat")[index] if hasattr(element, "quat") else np.array([1.0, 0, 0, 0])
         if kind == "light":
             element.dir = model.light_dir[index]
-        if kind == "body" and model.body_mass[index] == 0:
-            weighed(spec, element, model, index)  # or the compiler takes its place in the world for its centre of mass
+        if kind == "body" and _unweighed(model, np.array([index])).all():
+            not_simple(element)
         put(element, kind, model, index, of_model(model, f"{prefix}_pos")[index], quat)
 
     return prepare
@@ -139,6 +139,19 @@ def aimed(kind: str) -> Callable[[mujoco.MjModel, int], str]:
     return refused
 
 
+def _unweighed(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
+    """(N,) bool: bodies without an inertial. The compiler gives them one without mass, whose pose is, in numbers, the body's own."""
+    same = (model.body_ipos == model.body_pos).all(-1) & (model.body_iquat == model.body_quat).all(-1)
+    return (same & (model.body_mass == 0))[ids]
+
+
+def _inertial(spec: mujoco.MjSpec, element: Any) -> str:
+    """Why a body cannot move whose own inertial cannot be told from the one that the compiler gives a body without mass."""
+    own = element.explicitinertial and element.mass == 0
+    same = np.array_equal(element.ipos, element.pos) and np.array_equal(element.iquat, element.quat)
+    return "its <inertial> has no mass and is where the body is: leave it out" if own and same else ""
+
+
 def _edge(model: mujoco.MjModel, index: int) -> str:
     """Why a body cannot vary where it is: a flex is measured by its bodies."""
     return (
@@ -161,7 +174,7 @@ def _under(model: mujoco.MjModel, index: int) -> str:
 def poses(kind: str) -> dict[str, Attribute]:
     """Position and turn of a kind of element."""
     prefix = KINDS[kind].prefix
-    in_spec = fitted if kind == "geom" else None
+    in_spec = {"geom": fitted, "body": _inertial}.get(kind)
 
     def place(element: Any, value: np.ndarray, model: mujoco.MjModel, index: int) -> None:
         pos, quat = pose(element, kind, model, index)
@@ -179,10 +192,12 @@ def poses(kind: str) -> dict[str, Attribute]:
         )
 
     free = [Target(name, (0, 1, 2), free=True) for name in ("qpos0", "qpos_spring")] if kind == "body" else []
+    massless = [Target("body_ipos", of=_unweighed), Target("body_iquat", made=turned("body_quat"), of=_unweighed)]
+    shift, turns = ([one] for one in massless) if kind == "body" else ([], [])
     found = {
         f"{kind}.pos": Attribute(
             number(kind, XYZ, "[m]"),
-            (Target(f"{prefix}_pos"), *free),
+            (Target(f"{prefix}_pos"), *free, *shift),
             place,
             reader(f"{prefix}_pos", None, False),
             prepare=posed(kind),
@@ -197,6 +212,7 @@ def poses(kind: str) -> dict[str, Attribute]:
             (
                 Target(f"{prefix}_quat", made=turned(f"{prefix}_quat")),
                 *(Target(t.field, (3, 4, 5, 6), turned("body_quat"), free=True) for t in free),
+                *turns,
             ),
             turn,
             lambda model, ids: np.zeros((len(ids), 3)),

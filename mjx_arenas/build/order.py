@@ -1,0 +1,61 @@
+"""Frames in the order of what is in them (host): MuJoCo writes what a body has frame by frame, as they were added."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+
+from mjx_arenas.terms.attributes.attribute import KINDS
+
+_OF_BODIES = tuple(
+    kind.listed for name, kind in KINDS.items() if name in ("body", "geom", "site", "joint", "camera", "light")
+)
+
+
+def put_frames_in_order(spec: mujoco.MjSpec) -> None:
+    """Gives elements of a spec frames of their own where its MJCF would list them in another order than the compiler does."""
+    for body in spec.bodies:
+        for listed in _OF_BODIES:
+            elements = list(getattr(body, listed))
+            if not _sorted([_path(body, element) for element in elements]):
+                for element in elements:
+                    _reframe(body, element)
+
+
+def _frames(element: Any) -> list[Any]:
+    """The frames in which an element is, from the outermost."""
+    found, frame = [], element.frame
+    while frame is not None:
+        found.insert(0, frame)
+        frame = frame.frame
+    return found
+
+
+def _path(body: Any, element: Any) -> tuple[int, ...]:
+    """Which of its body's frames these are."""
+    return tuple(body.frames.index(frame) for frame in _frames(element))
+
+
+def _sorted(paths: Sequence[tuple[int, ...]]) -> bool:
+    """Whether frames come in the order in which they were added; what is in no frame is written where it is."""
+    last: dict[tuple[int, ...], int] = {}
+    for path in paths:
+        for depth, index in enumerate(path):
+            if index < last.get(path[:depth], -1):
+                return False
+            last[path[:depth]] = index
+    return True
+
+
+def _reframe(body: Any, element: Any) -> None:
+    """Puts an element into new frames like those in which it is, or into one that changes nothing."""
+    new = None
+    for frame in _frames(element) or [None]:
+        new = body.add_frame() if new is None else body.add_frame(new)
+        if frame is not None:
+            for name in ("pos", "quat", "scale", "scaling", "massscale"):
+                if hasattr(frame, name):  # MuJoCo 3 has no scales
+                    setattr(new, name, getattr(frame, name))
+            for name in ("type", "axisangle", "xyaxes", "zaxis", "euler"):
+                setattr(new.alt, name, getattr(frame.alt, name))
+    element.set_frame(new)

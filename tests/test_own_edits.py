@@ -1,0 +1,140 @@
+"""Worlds against edits of the MJCF as it was given, compiled by MuJoCo alone: what `vary` writes into `arena.spec` cannot hide there."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import mjx_arenas as mja
+from mjx_arenas import dr
+
+ROUNDED = 8 * 2.0**-23  # a few roundings of a number, relative to it
+BODY = '<body name="{0}" pos="{1} 0 1"><joint name="j{0}" axis="0 1 0"/><geom size=".02"/></body>'
+SCENE = """<mujoco>{top}<worldbody><body name="free" pos="0 0 1"><freejoint/><geom size=".1"/></body>
+<body name="arm" pos=".3 0 1"><joint axis="0 1 0"/><geom type="capsule" size=".03 .2"/>{hung}</body>{stands}</worldbody>{more}</mujoco>"""
+BARE = '<body name="it" pos="1 .5 .5" quat=".8 .6 0 0">{}</body>'
+MASSLESS = {
+    "nothing": {"stands": BARE.format("")},
+    "at the origin": {"stands": '<body name="it"><geom size=".1" mass="0"/></body>'},
+    "a geom without mass": {"stands": BARE.format('<geom size=".1" mass="0"/>')},
+    "mocap": {"stands": BARE.format("").replace("<body", '<body mocap="true"')},
+    "another group": {
+        "top": '<compiler inertiagrouprange="0 2"/>',
+        "stands": BARE.format('<geom size=".1" group="3"/>'),
+    },
+    "in a frame": {"stands": '<frame pos="0 0 .2" euler="0 0 30">' + BARE.format("<site/>") + "</frame>"},
+    "an end that is held": {
+        "hung": BARE.format('<camera mode="trackcom"/>'),
+        "more": '<equality><connect body1="it" body2="free" anchor="0 0 0"/></equality>',
+    },
+    "its own inertial": {
+        "stands": BARE.format('<inertial mass="0" pos=".1 .2 .3" quat="1 0 0 0" diaginertia="0 0 0"/>')
+    },
+}
+
+
+def scene(**parts):
+    return SCENE.format(**{**dict.fromkeys(("top", "hung", "stands", "more"), ""), **parts})
+
+
+@pytest.mark.parametrize("kind", MASSLESS)
+def test_bodies_without_mass(kind):
+    """MuJoCo puts the inertial of a body without mass where the body is, in all worlds."""
+    xml = scene(**MASSLESS[kind])
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(pos=dr.Term("body.pos", "it"), rpy=dr.Term("body.rpy", "it"))
+    ranges = mja.ArenaRanges(
+        terms={"pos": mja.Uniform(-0.5, 0.5, relative="add"), "rpy": mja.Uniform(-0.5, 0.5)}  # [m], [rad]
+    )
+    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(3)), ranges)
+    recompiled = {}
+    for w in range(3):
+        made, spec = arena.compile(batch.world(w)), mujoco.MjSpec.from_string(xml)
+        element, at = spec.body("it"), made.body("it")
+        if element.frame is not None:
+            element.set_frame(element.parent.add_frame())
+        element.pos, element.quat = at.pos, at.quat
+        recompiled[w] = spec.compile()
+        for name in ("body_ipos", "body_iquat", "body_invweight0", "cam_poscom0", "body_sameframe"):
+            ours, theirs = getattr(made, name), getattr(recompiled[w], name)
+            np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-14, err_msg=name)
+        assert not np.allclose(at.pos, arena.mj_model.body("it").pos)
+    told = mja.differences(batch.model, recompiled)
+    assert max(told.values(), default=0.0) < ROUNDED, told
+
+
+def test_an_inertial_without_mass_where_the_body_is():
+    """It cannot be told from the one that the compiler makes, which goes where the body goes."""
+    inertial = '<body name="it"><inertial mass="0" pos="0 0 0" diaginertia="0 0 0"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=inertial))
+    with pytest.raises(
+        ValueError, match=r"cannot vary, as its <inertial> has no mass and is where the body is: leave it out\.$"
+    ):
+        arena.vary(pos=dr.Term("body.pos", "it"))
+
+
+@pytest.mark.parametrize("attribute", ["body.mass", "body.mass_alone", "body.inertia"])
+def test_inertials_of_aligned_bodies(attribute):
+    """The compiler moves the frame of such a body, in which its inertial would be written."""
+    box = '<body name="it"><freejoint align="true"/><geom type="box" size=".1 .05 .02" pos=".1 0 0"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=box))
+    with pytest.raises(ValueError, match=r"the body is free and aligned with its inertia"):
+        arena.vary(it=dr.Term(attribute, "it"))
+
+
+KEYED = '<keyframe><key name="k" qpos="{}"/></keyframe>'
+FRAMED = '<frame pos="0 0 1" axisangle="0 0 1 20">{}</frame>'
+JOINTS = '<joint name="{0}" axis="0 {1} {2}" pos=".1 0 0"/>'
+ORDERS = {
+    "two frames": ("body.pos", "a", FRAMED.format(BODY.format("a", 0)) + FRAMED.format(BODY.format("b", 1))),
+    "one frame": ("body.pos", "a", FRAMED.format(BODY.format("a", 0) + BODY.format("b", 1))),
+    "one between": (
+        "body.rpy",
+        "a",
+        FRAMED.format(BODY.format("a", 0)) + BODY.format("c", 2) + FRAMED.format(FRAMED.format(BODY.format("b", 1))),
+    ),
+    "joints": (
+        "joint.axis",
+        "ja",
+        '<body name="a">'
+        + FRAMED.format(JOINTS.format("ja", 1, 0) + JOINTS.format("jb", 0, 1))
+        + '<geom pos=".2 0 0" size=".1"/></body>',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ORDERS)
+def test_order_in_files(case):
+    """The MJCF of a world lists joints as its model has them, and so gives each what a keyframe says."""
+    attribute, name, stands = ORDERS[case]
+    n = 1 + stands.count("joint")
+    keyed = KEYED.format(" ".join(["0 0 1 1 0 0 0", *(str(0.1 * i) for i in range(n))]))
+    arena = mja.Arena.from_xml(scene(stands=stands, more=keyed))
+    arena.vary(it=dr.Term(attribute, name))
+    params = arena.nominal_params()
+    made, written = arena.compile(params), mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    assert [made.joint(i).name for i in range(made.njnt)] == [written.joint(i).name for i in range(made.njnt)]
+    ours, theirs = (mujoco.MjData(one) for one in (made, written))
+    for model, data in ((made, ours), (written, theirs)):
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(ours.geom_xpos, theirs.geom_xpos, atol=1e-12)
+    np.testing.assert_allclose(ours.qpos, theirs.qpos)
+
+
+def test_keyframes_of_mocap_bodies_in_c_batch():
+    """A keyframe that leaves out where mocap bodies are has them where each world has them."""
+    keys = '<keyframe><key name="own" mpos="0 0 3"/><key name="left out" qvel="1 0 0 0 0 0 0"/></keyframe>'
+    xml = scene(stands='<body name="it" mocap="true" pos="1 1 1"><geom size=".05"/></body>', more=keys)
+    arena = mja.Arena.from_xml(xml)
+    arena.vary(pos=dr.Term("body.pos", "it"), rpy=dr.Term("body.rpy", "it"))
+    ranges = mja.ArenaRanges(terms={"pos": mja.Uniform([1, 1, 1], [2, 2, 2]), "rpy": mja.Uniform(-0.5, 0.5)})
+    seeds = mja.world_keys(0, range(2))
+    batch = arena.randomize(arena.put_model("jax"), seeds, ranges)
+    cpu = arena.c_batch(batch.params, keys=seeds)
+    for w in range(2):
+        ours, theirs = cpu.get_model(w), arena.compile(batch.world(w))
+        for name in ("key_mpos", "key_mquat", "key_qpos"):
+            np.testing.assert_allclose(
+                getattr(ours, name), getattr(theirs, name), rtol=ROUNDED, atol=1e-7, err_msg=name
+            )
+        assert not np.allclose(theirs.key_mpos[0], theirs.key_mpos[1])
