@@ -68,6 +68,7 @@ def elements(model, kind):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("jax")
 def test_as_compiled(arena, worlds):
     """Where they are, and what they look at, of all that the compiled worlds have."""

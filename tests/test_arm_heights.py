@@ -60,6 +60,7 @@ def limits(distance):
     return np.array([beside[1, 0], beside[:, 0].max()]), np.array([beside[:, 1].min(), beside[1, 1]])
 
 
+@pytest.mark.slow
 def test_heights_are_those_of_its_links():
     """The last height that is tried and reached is at most one step within the limit, and between two distances between theirs."""
     small = found(arms.small())

@@ -112,6 +112,7 @@ def in_c(env):
     return state, episode, data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LINKS)
 def test_each_of_them_counts(name):
     """Alone, too, by C MuJoCo. Without the episode a pose is refused, not taken for the nominal arm's."""

@@ -175,6 +175,7 @@ OPENED = [
 ]
 
 
+@pytest.mark.slow
 def test_open_drawer():
     env, params, task = made(OpenDrawer)
     tool = world(env, params).site("arm_tool").xpos.copy()
@@ -198,6 +199,7 @@ def test_open_drawer():
 RAISED = 0.37  # [m]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Reach, Lift, PickAndPlace, OpenDrawer])
 def test_heights_of_tables_are_not_seen(kind):
     """Where all tables, and all that stands on them or on the floor, are raised, policies see the same, and get the same reward.

@@ -28,6 +28,7 @@ PLACES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(
     "ignore:`(arena|goals)`. .* is on (table 0|'unit_top')"
 )  # which is far from the unit, and from the world's origin

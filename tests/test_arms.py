@@ -322,6 +322,7 @@ def test_a_gripper_with_motors(limited):
     np.testing.assert_allclose(seen[17:19], np.array([0.75, 0]) - is_open, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_wrong():
     """A servo that is missing, other actions, nothing to lift and no such goal."""
     arm = arms.small()

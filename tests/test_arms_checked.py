@@ -37,6 +37,7 @@ def without_ends(**fingers):
     return dataclasses.replace(arm, fingers={**arm.fingers, **fingers})
 
 
+@pytest.mark.slow
 def test_a_path_or_text(tmp_path, monkeypatch):
     """As `attach` and `simplify` take them; a wrong one is answered when the arm is made."""
     small = arms.small()
@@ -69,6 +70,7 @@ def shaky(armature=0.0, force=1000.0, integrator=mujoco.mjtIntegrator.mjINT_EULE
     return arm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [1000.0, 1e6])
 def test_an_arm_that_shakes_apart(force):
     """Within bounds, or until MuJoCo would begin anew: what moves is told, in the warning and the report."""
@@ -84,6 +86,7 @@ def test_an_arm_that_shakes_apart(force):
     assert str(report).splitlines()[-2:] == [widest, f"rest: within a second of the keyframe {what[1]}"]
 
 
+@pytest.mark.slow
 def test_what_brings_an_arm_to_rest():
     """What the warning advises; warnings are errors here."""
     assert lift.default_config().ctrl_dt == moves.ACTION
@@ -126,6 +129,7 @@ def test_three_fingers_open_along_no_line():
     np.testing.assert_allclose(opening.aside(model, closed, opened, "tool"), np.degrees(0.3) - 90, atol=0.01)
 
 
+@pytest.mark.slow
 def test_width_and_gap():
     """The report has both; what an object may be wider than the gap is said."""
     arm = arms.small()

@@ -19,6 +19,7 @@ GEOM = mujoco.mjtObj.mjOBJ_GEOM
 CORNERS = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
 
 
+@pytest.mark.slow
 @needs_gl
 @pytest.mark.parametrize(
     ("task", "arm"),

@@ -451,6 +451,7 @@ def possible(env, at, **values):
 WIDE, LONG = [[0.2, 0.2, 0.05]], [[0.2, 0.09, 0.05]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
 def test_impossible_tasks_of_arms_are_told(kind):
     """The object, 9 cm wide at most, is 22 to 44 cm from the small arm, which stands on any table at any yaw."""

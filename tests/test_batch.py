@@ -19,6 +19,7 @@ from mjx_arenas.sim import batch as batch_
 from mjx_arenas.sim import data as data_
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_batch_equals_loop(arena, batch, impl):
     """Each world of a batch is the world alone, to the bit; all else is shared."""
@@ -116,6 +117,7 @@ def _time(data):
     return data.time
 
 
+@pytest.mark.slow
 def test_make_data(arena, batch, keys, impl):
     """Objects touch their tables from above, and static geoms stand where each world has them."""
     data = mja.make_data(batch, keys)

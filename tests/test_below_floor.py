@@ -86,6 +86,7 @@ def test_a_floor_that_rises():
     assert told(one, higher) == ["The top of table 'desk' is 0.08 m below the floor."]
 
 
+@pytest.mark.slow
 def test_drawn(tmp_path):
     """`randomize` says why no world is valid, `check` reports them, and bundles say it again without the arena, older ones nothing."""
     ranges = mja.ArenaRanges(table_offsets=mja.Uniform([0, 0, -1.2], [0, 0, -1.0], relative="add"))

@@ -76,6 +76,7 @@ def test_worlds_are_compiled(arena, impl):
         )
 
 
+@pytest.mark.slow
 def test_absent_with_what_carries_it(arena):
     """A crate is gone with its board, a tray with its table, and with them all that stands in them; in C, too."""
     nominal = jax.tree.map(np.asarray, arena.nominal_params())
@@ -191,6 +192,7 @@ def manned():
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_robots_follow(manned, impl):
     """They are as compiled, on a top that moves as cabinets grow; and stand there in C, with the same distance to what carries them."""

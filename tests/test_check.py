@@ -145,6 +145,7 @@ def test_a_bundle_of_a_world_in_which_nothing_is_wrong(tmp_path):
     assert not (tmp_path / "bundle").exists()
 
 
+@pytest.mark.slow
 def test_impossible_arenas(crowd, tmp_path, monkeypatch):
     """Worlds that cannot be are reported with the reason, and stepped as MuJoCo compiles them; their bundles say it again."""
     ranges = mja.ArenaRanges(table_full_sizes=mja.Uniform([0.1, 0.1, 0.02], [0.11, 0.11, 0.05]))
@@ -313,6 +314,7 @@ def kept(foil, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", DAMAGED)
 def test_damaged_bundles(case, kept, tmp_path):
     """One sentence names the file and what is wrong with it."""
@@ -345,6 +347,7 @@ def test_edited_bundles(case, kept, tmp_path):
     assert str(error.value).startswith(f"{str(folder / name)!r} is not what `check` wrote: {why}")
 
 
+@pytest.mark.slow
 def test_numbers_of_numpy(foil, tmp_path):
     """The seed, and the worlds that `failed` picks, as NumPy has them; reports are compared as what they are, not element by element."""
     report = mja.check(foil, TURNED, worlds=np.array([2, 5]), seed=np.int64(1), n_steps=np.int64(12), engine="c")

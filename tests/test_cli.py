@@ -254,6 +254,7 @@ def test_render(here, scenes, capsys):
         assert plan.size[0] > 1000
 
 
+@pytest.mark.slow
 def test_video(here, scenes, capsys):
     """A video has as many pictures as its time asks for, and says which engine stepped it."""
     asked = ["--worlds", "5", "--size", "96x64", "--seconds", "0.2", "--engine", "c"]

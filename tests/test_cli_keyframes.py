@@ -33,6 +33,7 @@ def here(tmp_path, monkeypatch):
     (tmp_path / "arm.json").write_text(json.dumps(FILE))
 
 
+@pytest.mark.slow
 def test_export():
     for keyframe, turn in (([], 0), (["--keyframe", "r_up"], -1.5)):
         out = f"out{len(keyframe)}"
@@ -84,6 +85,7 @@ def test_unknown(command, out, capsys):
     assert capsys.readouterr().err == "error: --keyframe must be 'r_up', got 'r_down'.\n"
 
 
+@pytest.mark.slow
 def test_a_state_is_shown(capsys):
     """The state that Python saved of a world is what `export` writes and `render` draws."""
     arena, ranges = mja.load("arm.json")

@@ -45,6 +45,7 @@ def params_of(arena, there):
     return nominal._replace(terms={"there": np.array(there), "size": nominal.terms["size"] * 1.2})
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("there", CASES)
 def test_what_is_left_is_compiled(arena, impl, there):

@@ -279,6 +279,7 @@ def test_a_body_at_three_tables(resting, plain):
         np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "edit",
     [
@@ -296,6 +297,7 @@ def test_not_culled(edit):
     assert plan_of(batch, mja.make_data(batch)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n_tables", "culled"), [(1, False), (4, False), (5, True)])
 def test_culled_where_it_pays(n_tables, culled):
     """Few tables are not worth it."""

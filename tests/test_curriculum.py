@@ -65,6 +65,7 @@ def drawn(arena, ranges):
     return *(jax.tree.map(np.asarray, tree) for tree in (params, full)), np.asarray(valid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", RANGES)
 def test_from_nominal_to_full(arena, case):
     """Nominal at level 0, the full range's draws at level 1, within both in between, and ever wider."""
@@ -91,6 +92,7 @@ def test_from_nominal_to_full(arena, case):
     assert changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", UNCHANGED)
 def test_unchanged(arena, case):
     """What has no way from nominal is the same at every level."""

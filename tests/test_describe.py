@@ -82,6 +82,7 @@ def test_many_worlds():
     assert ["", "table1", "yes", "no", f"yes in {1 - share:.1%}", "yes"] in lines  # a line for each table, however many
 
 
+@pytest.mark.slow
 def test_absent():
     """What is switched off in every world is named: tables with what stands on them, objects, parts, boards, bodies."""
     arena = mja.MultiTableArena(

@@ -36,6 +36,7 @@ def test_worlds_are_those_compiled(batch, compiled):
     assert max(mja.differences(batch.model, compiled).values()) < ROUNDED
 
 
+@pytest.mark.slow
 def test_one_world(arena, batch, compiled):
     one = arena.apply(arena.put_model("jax"), batch.world(3))
     assert max(mja.differences(one, compiled[3]).values()) < ROUNDED
@@ -117,6 +118,7 @@ def test_what_is_there_is_compared_by_name(impl):
     assert max(mja.differences(batch.model, compiled).values()) < ROUNDED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("field", "row", "noticed"),
     [

@@ -234,7 +234,7 @@ WRONG = {
     ),
     "range": (
         {"x": dr.Term("joint.range", "hip_a")},
-        "`x.elements`: 'joint.range' of joint 'hip_a' cannot vary, as it has no `range`: give it a wide one in the MJCF.",
+        "`x.elements`: 'joint.range' of joint 'hip_a' cannot vary, as it has no `range` in force: give it a wide one in the MJCF.",
     ),
     "free": (
         {"x": dr.Term("joint.pos", "root")},
@@ -358,6 +358,7 @@ ALONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ALONE)
 def test_terms_alone(case):
     """Few terms, as a user would: written when all vary, and when one of them does."""

@@ -42,12 +42,14 @@ def test_all_places_to_which_an_arm_goes_count():
         assert not found.at(jnp.float32(distance), jnp.float32(high)), (distance, high)
 
 
+@pytest.mark.slow
 def test_what_an_arm_promises_counts():
     far = anywhere(dataclasses.replace(arms.small(), reach=(0.7, 0.75)))  # its links are 0.64 m
     assert far.at(jnp.float32(0.72), jnp.float32(0.1))
     assert not far.at(jnp.float32(0.72), jnp.float32(0.5))
 
 
+@pytest.mark.slow
 def test_an_arm_that_slides_goes_as_far_as_its_length():
     spec = mujoco.MjSpec.from_string(
         """<mujoco><worldbody><body name="base"><body name="rail"><joint name="rail" type="slide" axis="1 1 0" range="-1 1"/>
@@ -97,6 +99,7 @@ UNREACHED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", UNREACHED)
 def test_drawers_out_of_reach_are_told(case):
     """Once, when the task is made."""
@@ -106,6 +109,7 @@ def test_drawers_out_of_reach_are_told(case):
     assert [str(one.message) for one in told] == [SAYS.format(when, where)]
 
 
+@pytest.mark.slow
 def test_drawers_within_reach_are_not_told():
     """Nominally, or in half of the worlds; warnings are errors here. Those of the task's own ranges are all possible, see below."""
     nominal()
@@ -135,6 +139,7 @@ def drawing(env):
     return jax.jit(env.draw_task)
 
 
+@pytest.mark.slow
 def test_impossible_drawers_are_reported():
     """10 cm nearer, the front would come to the table of the arm before the goal: 0.335 - 0.252 m is less than 0.12."""
     env = nominal()
@@ -149,6 +154,7 @@ def test_impossible_drawers_are_reported():
     assert not possible(standing, table_active=jnp.array([True, False]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["training_ranges", "wider_ranges"])
 def test_all_of_the_task_s_own_are_possible(kind):
     env = OpenDrawer(config_overrides=WARP)
@@ -170,6 +176,7 @@ def open_by(least, most):
     return mja.ArenaRanges(terms={"unit.openings": mja.Uniform([0.0, 0.0, least], [0.0, 0.0, most])})
 
 
+@pytest.mark.slow
 def test_shut_drawers_are_told():
     """Nominally, and in more than half of 64 worlds; and reported: fingers are 12 mm thick, and the panel 15 mm behind the unit's edge."""
     with pytest.warns(UserWarning, match="^`arena`: the gripper does not fit in") as told:
@@ -244,6 +251,7 @@ def test_a_drawer_that_is_open_already_is_no_success():
         assert jnp.isfinite(reward)
 
 
+@pytest.mark.slow
 def test_drawers_that_are_never_there_are_refused():
     says = "^`unit` must be a part of the arena that is there in some world, got 'unit'.$"
     with pytest.raises(ValueError, match=says):

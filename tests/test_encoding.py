@@ -53,6 +53,7 @@ def test_there_and_back(arena):
     assert jnp.isfinite(jax.vmap(lambda p: arena.log_prob(p, RANGES))(params)).all()
 
 
+@pytest.mark.slow
 def test_points_are_worlds(arena):
     """Uniform points give what keys draw: means and spreads of both agree."""
     n = 4000
@@ -67,6 +68,7 @@ def test_points_are_worlds(arena):
         assert (np.abs(x.std(0) - y.std(0)) <= 0.12 * y.std(0) + 1e-6).all(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dist", "want"),
     [
@@ -139,6 +141,7 @@ def test_counts_of_objects(arena):
     same(arena.decode(arena.encode(params, ranges), ranges), params)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -157,6 +160,7 @@ def test_impossible(arena, change):
     assert float(arena.log_prob(params._replace(**change), RANGES)) == -np.inf
 
 
+@pytest.mark.slow
 def test_density_adds_up_to_one(arena):
     """Importance: of draws under a wide range, the mean of exp(log ratio) to a narrow one is 1."""
     wide = mja.ArenaRanges(

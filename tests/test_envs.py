@@ -146,6 +146,7 @@ def test_only_worlds_that_end_change(env, reset, step):
     assert np.asarray(after.data.time)[[0, 2, 3]].min() > np.asarray(after.data.time)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_world_depends_on_its_key_alone(apart):
     """The arenas of a world are the same whatever the other worlds do, and when."""

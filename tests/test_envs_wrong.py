@@ -27,6 +27,7 @@ def used_arena():
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -384,6 +385,7 @@ def test_a_policy_that_draws_on_the_host():
     assert len(told) == 1
 
 
+@pytest.mark.slow
 def test_a_state_of_another_environment():
     state = jax.eval_shape(slide("jax")[1], keys())
     one = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape[1:], x.dtype), state)

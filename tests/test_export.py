@@ -76,6 +76,7 @@ def test_steps_as_in_the_batch(arena, batch, keys, tmp_path):
     assert np.abs(np.array(states[1]["qpos"])[z] - worlds.rest_heights(arena, batch.params)[3]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_parameters_are_noted(arena, batch, tmp_path):
     """The JSON holds the parameters to the bit, and what else says which world this is."""
     params = batch.world(5)

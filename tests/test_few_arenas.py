@@ -40,6 +40,7 @@ def heights(one, n_worlds=32, n_episodes=3):
     return [np.asarray(x) for x in zip(*seen, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arenas", ["every_episode", pytest.param("fixed", marks=pytest.mark.slow)])
 def test_there_are_so_many(arenas):
     """Worlds share the arenas of `world_keys`, to the bit, and cubes stand elsewhere in every episode."""
@@ -66,6 +67,7 @@ def own(config_overrides=None):
     return idle.Idle(arena, RANGES, ctrl_dt=0.02, sim_dt=0.004, **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["push", f"{__name__}:own"])
 def test_policies_are_judged_on_others(task):
     """Trainings on few arenas are judged on arenas without a limit, also where a task of one's own has the limit by itself."""

@@ -78,6 +78,7 @@ def test_load_is_python(tmp_path):
     assert same((arena, ranges), mja.load(file))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(OVERLAP)
 @pytest.mark.parametrize("suffix", [".yaml", ".json"])
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -48,6 +48,7 @@ def judged(arena, engine):
     return found["deep_penetration"]
 
 
+@pytest.mark.slow
 @pytest.mark.xslow_on("jax")
 @pytest.mark.parametrize("engine", ["c", *(pytest.param(name, marks=pytest.mark.slow) for name in ("jax", "warp"))])
 def test_two_pairs(engine):

@@ -121,6 +121,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges.terms.level` lets 'block' sink up to 0.05 m into 'floor'")
 @pytest.mark.parametrize("case", WRONG)
 def test_told(case, tmp_path):

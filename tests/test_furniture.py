@@ -174,6 +174,7 @@ def test_rail():
     assert found["rail0"][1, 0] == pytest.approx(found["post0"][0, 0])  # in front of the posts
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_worlds_are_compiled(arena, impl):
     """All numbers of all parts others than nominal: each field as in the recompiled model."""

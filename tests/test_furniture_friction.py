@@ -73,6 +73,7 @@ RULES = {(0, 0): HIGH, (1, 0): LOW, (2, 0): LOW, (0, 1): HIGH, (1, 1): HIGH, (2,
 """Which friction counts, of each `table_priority` and `priority` of the object."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MADE)
 def test_one_rule(kind):
     """On a table, on a board and in a tray that stands on another board an object has one friction, whatever the priorities."""

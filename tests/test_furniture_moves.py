@@ -259,6 +259,7 @@ def test_what_moves_comes_and_goes(laden, impl, gone):
     assert laden.c_world(params)[0].njnt == compiled.njnt
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges` leaves object")
 @pytest.mark.slow_on("warp")
 def test_single_drawers_come_and_go(laden, impl):

@@ -49,6 +49,7 @@ def slips(arm, option, side, mass=HEAVY, sliding=SLIPPERY):
     return (after(SECONDS, -9.81) - before) / SECONDS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ["small", "yam", "panda"])
 def test_contacts_are_solved(arm):
     """The solver may take as many iterations as MuJoCo's own limit; with 10, two of three worlds of the YAM reached it in 100 steps."""

@@ -82,6 +82,7 @@ def test_axes_of_symmetric_bodies(dtype):
         assert apart(np.asarray(quat), quats).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_sensors_in_the_frame_of_an_inertia(impl):
     """A position in it, and how it is turned, are C MuJoCo's in worlds of other densities."""
@@ -97,6 +98,7 @@ def test_sensors_in_the_frame_of_an_inertia(impl):
         np.testing.assert_allclose(data.sensordata[i], twin.sensordata, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "second"),
     [

@@ -103,6 +103,7 @@ def test_sizes_of_blocks(worlds, monkeypatch):
     )
 
 
+@pytest.mark.slow
 def test_other_threads_launch(worlds, monkeypatch):
     """What XLA's threads launch while a step is only written down is launched: a step that was begun before is not lost."""
     arena, batch, data = worlds

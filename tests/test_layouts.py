@@ -92,6 +92,7 @@ def test_abut(arena, far):
     np.testing.assert_allclose(found["ramp"][1][0], rack[0][0], **close)
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_worlds_are_compiled(arena, impl):
     """All numbers of all parts others than nominal: each field as in the recompiled model."""

@@ -357,6 +357,7 @@ WORLDS = {
 }
 
 
+@pytest.mark.slow
 def test_tables_of_scenes_have_names(tmp_path):
     """Sentences about a table that has a name of its own call it by that; of worlds, ranges, warnings and bundles."""
     arena = desks()

@@ -82,6 +82,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_what_is_never_there_is_refused(case):
     make, says = CASES[case]
@@ -116,6 +117,7 @@ def seldom(kind):
     return kind(ranges=mja.ArenaRanges(object_active=mja.Bernoulli(0.5)), config_overrides=WARP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", [Push, pytest.param(Transfer, marks=pytest.mark.slow)]
 )  # test_arms_wrong.py has those of arms

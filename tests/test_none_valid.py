@@ -86,6 +86,7 @@ SAID = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SAID)
 def test_said(case):
     """The reason of `arena.problems`, and what may have been meant."""
@@ -116,6 +117,7 @@ def test_commonest_reasons():
     assert found.numbers == {"n": n, "n_valid": 0, "why": f"World 4: {larger} World 0: {light}".removesuffix(".")}
 
 
+@pytest.mark.slow
 def test_few_worlds():
     """Of fewer than eight worlds it may be chance."""
     assert said(fresh(), LARGE, 7, template())[0] == []

@@ -70,6 +70,7 @@ def told(kind, where, middle, yaw):
     return jax.device_get(run(jnp.asarray(middle, jnp.float32)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Lift, PickAndPlace])
 def test_an_object_whose_origin_is_elsewhere(kind):
     """Near the tool, lifted, at its goal, and fallen."""

@@ -31,6 +31,7 @@ def push_aside(tmp_path, monkeypatch):
     return configured.environment({"task": "push_aside:PushAside", "impl": "warp", "sees": "numbers"})
 
 
+@pytest.mark.slow
 def test_the_task_of_the_page(push_aside):
     env = push_aside
     params, model = env.arena.nominal_params(), env.mj_model
@@ -71,6 +72,7 @@ def test_the_task_of_the_page(push_aside):
     np.testing.assert_allclose(state[-6:-3], box - base.xmat.reshape(3, 3).T @ (tool - base.xpos), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_it_is_trained_from_its_file(push_aside):
     """As the command of the page does."""
     data = settings.settled(settings.read(settings.find("push_aside:PushAside")), gpu=False, pixels=False)
@@ -85,6 +87,7 @@ def test_it_is_trained_from_its_file(push_aside):
     assert state.reward.shape == (2,)
 
 
+@pytest.mark.slow
 def test_other_arms(tmp_path, monkeypatch):
     """Each has a base of its own name."""
     monkeypatch.syspath_prepend(models.ROBOTS)  # where the tests have robots' packages

@@ -139,6 +139,7 @@ def test_environment_of_a_training(mine, monkeypatch):
         policies.load_env(None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -167,6 +168,7 @@ def test_a_task_that_has_changed(old, new, told, mine):
     assert (told in str(messages.error([found]))) if told else found is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [{}, {"config": {"arenas": "fixed"}}], ids=["of the task", "of an older training"])
 def test_judged_on_new_arenas(own, mine):
     """In every episode, also where a task has another default, and where an older training's configuration says so."""

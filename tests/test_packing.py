@@ -121,6 +121,7 @@ def kinds(name, n):
     return np.array(half), np.array(radius)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_inside_and_apart(kind):
     """Crowded worlds far from the origin: with a gap and a margin, past obstacles, on three levels."""
@@ -214,6 +215,7 @@ def test_uniform_beside_an_obstacle():
     assert abs(share - p) < 4 * np.sqrt(p * (1 - p) / 40000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["boxes", "capsules"])
 def test_flag_against_brute_force(kind):
     """Among random obstacles: no place where a grid shows none, a place wherever it shows room."""
@@ -300,6 +302,7 @@ def test_exactly_as_wide():
     np.testing.assert_allclose(pose, np.broadcast_to(areas.pose, pose.shape), atol=4 * EPS * 7.2)
 
 
+@pytest.mark.slow
 def test_yaws_within():
     """Of what may turn a little, in the frame of its region, also in a crowd; what may have any yaw is where it was."""
     half, radius = [[0.055, 0.03], [0.06, 0.04], [0.07, 0.02], [0.06, 0.05], [0.05, 0.02]], 0.01
@@ -343,6 +346,7 @@ def test_a_round_for_the_hopeless(monkeypatch):
     assert len(rounds) == 2
 
 
+@pytest.mark.slow
 def test_the_same_in_any_batch():
     """A world is the same alone, in a batch of any size or depth, and in a scan, bit by bit."""
     half, radius = kinds("mixed", 9)

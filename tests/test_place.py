@@ -217,6 +217,7 @@ AWAY: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", AWAY)
 def test_nominally_out_of_reach(case):
     """One sentence when the arena is compiled, of what is there and not as near as it must be; and what it says of keys is so."""
@@ -269,6 +270,7 @@ ROOM = {
 """Objects that are nominally there or not, and what is told of those which their place leaves no room."""
 
 
+@pytest.mark.slow
 def test_nominally_without_room():
     """One sentence each when the arena is compiled, of those alone that then find no place with any key."""
     drum = mja.Object("drum", "cylinder", (0.2, 0.2, 0.1))
@@ -329,6 +331,7 @@ def test_merged(near):
     assert (np.abs(away - 0.225) <= 0.025 + 1e-5).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rot", [(-0.3, 0.2), (0.4, 0.4), None])
 def test_yaws(rot, tmp_path):
     """Relative to the table, or the object, on which it stands, in the MuJoCo model of each world; an arena of a file has the same."""

@@ -47,6 +47,7 @@ def test_what_a_thin_slab_bares():
         assert nearest < clear + 0.02
 
 
+@pytest.mark.slow
 def test_inside_and_apart():
     """On crowded tables, footprints stay inside the edges, and C MuJoCo finds a gap between all objects that were placed."""
     objects = [
@@ -99,6 +100,7 @@ def test_too_large_for_its_table():
     assert bottoms[1] >= found.qpos[0, 2] + 0.2 - 1e-6
 
 
+@pytest.mark.slow
 def test_without_a_place_on_another_one():
     """Over the table on which that one stands, or would."""
     objects = [mja.Object(name, full_size=(0.3, 0.3, 0.1)) for name in ("w", "a")] + [
@@ -115,6 +117,7 @@ def test_without_a_place_on_another_one():
     assert (abs(np.asarray(found.qpos[without, 2, :2])) < 0.2).all()
 
 
+@pytest.mark.slow
 def test_without_a_place_over_its_own_table():
     """Also where it was tried beside the table: what fits reaches over no edge, and what is too large starts over the middle."""
     objects = [mja.Object(f"o{i}", full_size=(0.2, 0.3, 0.1), place=mja.Place(margin=0.02)) for i in range(3)]

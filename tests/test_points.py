@@ -39,6 +39,7 @@ def edited(text, attribute, value):
     return spec.compile()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("attribute", "value", "weight", "more"),
     [

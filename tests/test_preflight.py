@@ -101,6 +101,7 @@ def test_right_randomizer(model):
         report.n_worlds = 3
 
 
+@pytest.mark.slow
 def test_what_varies_is_of_one_element(model):
     """The bounds are those of the number that varies most, with its name, not of all that vary mixed."""
     report = check(

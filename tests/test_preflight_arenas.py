@@ -92,6 +92,7 @@ OURS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OURS)
 def test_arenas_are_right(arena, impl, name):
     """Every field that this library writes, with each kind of range; the note of Warp is there when tables move."""

@@ -57,6 +57,7 @@ def floats(model):
     return {name: x for name, x in vars(model).items() if isinstance(x, jax.Array) and x.dtype.kind == "f"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_all_that_is_read_is_declared(name):
     """By the operations of the traced program: a rule that reads a field without saying so would not be computed where that varies."""

@@ -57,6 +57,7 @@ def test_every_number_of_a_quantity_counts(n):
     assert one != other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("impl", ["jax", "warp"])
 @pytest.mark.parametrize("use", [drawn, pytest.param(used, marks=pytest.mark.slow)])
 def test_a_second_equal_arena_compiles_nothing(use, impl):

@@ -174,6 +174,7 @@ def test_state_of_a_world_without_a_table(arena):
     np.testing.assert_array_equal(arena.c_world(params, c)[1].xpos, c.xpos)
 
 
+@pytest.mark.slow
 def test_take(arena, batch, keys):
     """One world or a few of parameters and of data are those that slices give."""
     data = mja.make_data(batch, keys)
@@ -193,6 +194,7 @@ def test_take(arena, batch, keys):
     assert numpy.table_rots.dtype == np.float64
 
 
+@pytest.mark.slow
 def test_take_of_a_batch(arena, batch, keys):
     """Some worlds of a batch are the batch of their parameters, in any order; one of them, too."""
     some = mja.take(batch, [3, 0])
@@ -206,6 +208,7 @@ def test_take_of_a_batch(arena, batch, keys):
     assert mja.take(some, [1]).world(0).table_rots.tolist() == some.params.table_rots[1].tolist()
 
 
+@pytest.mark.slow
 @needs_gl
 def test_contact_sheet(arena, batch, keys):
     """A picture in a sheet is the picture alone."""

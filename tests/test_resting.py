@@ -196,6 +196,7 @@ TURNED = 2 * 1e-3 / 0.03
 """Contacts give way by less than a millimetre, on either side of the shortest side of all objects [rad]."""
 
 
+@pytest.mark.slow
 def test_stay_where_they_lie():
     """After a second in C nothing has moved by more than contacts give way; what is round may roll, with its axis level."""
     arena, (keys, _) = scene(), drawn()

@@ -101,6 +101,7 @@ def test_left_out_stays_nominal():
         np.testing.assert_array_equal(getattr(x, name), np.broadcast_to(getattr(nominal, name), getattr(x, name).shape))
 
 
+@pytest.mark.slow
 def test_world_does_not_depend_on_batch(arena):
     """World i is the same in a batch of 3, of 8, and alone."""
     keys = jax.random.split(jax.random.key(1), 8)

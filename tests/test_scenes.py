@@ -96,6 +96,7 @@ def kept_rows(arena, there):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:`ranges.object_full_sizes` does not change")
 def test_absent(impl):
     """What is there is the model that MuJoCo compiles without what is absent; the mean inertia gives the same solver."""
@@ -267,6 +268,7 @@ def test_rays_pass_through_what_is_absent(impl):
 SHELF = """<mujoco><worldbody><body><geom type="box" size=".2 .2 .01" mass="3"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objects", [(), (mja.Object("cube"),)])
 def test_fixtures_of_absent_tables(impl, objects):
     """What is fixed on a table that is absent has no mass, as the table."""
@@ -306,6 +308,7 @@ def test_nominally_absent(impl):
     assert differing(arena.mj_model, worlds.leaves(again), worlds.leaves(model)) == set()
 
 
+@pytest.mark.slow
 def test_one_varying_presence(impl):
     """A batch in which only presence varies stores every leaf that follows from it."""
     arena = mja.MultiTableArena([[0, 0, 0.8], [1.5, 0, 0.8]], objects=[mja.Object("a"), mja.Object("b", on=1)])
@@ -492,6 +495,7 @@ def test_far_tables_move_the_statistics():
     np.testing.assert_allclose(got.center, expected.center, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["cube", "table1"])
 @pytest.mark.parametrize("kind", ["camera", "light"])
 def test_aimed_at_what_is_absent(kind, target):

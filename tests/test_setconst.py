@@ -348,6 +348,7 @@ def test_dampratio_is_the_compilers(impl):
         np.testing.assert_array_equal(got.actuator_biasprm, m.actuator_biasprm.astype(np.float32))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_ranks_are_explicit(name, impl):
     """Nothing is broadcast over axes that it does not have."""
@@ -419,6 +420,7 @@ def test_refusals():
         set_const(unknown)
 
 
+@pytest.mark.slow
 def test_many_worlds():
     """A model with an axis of worlds is refused outside of `vmap`, by the first field that has one, whichever it is."""
     model = pair("actuators", "jax").stale

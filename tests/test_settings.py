@@ -355,6 +355,7 @@ def trainings():
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", trainings())
 def test_documented_trainings(words, tmp_path, monkeypatch, capsys):
     """A training would begin: its task, its arm and its arena are there, and what it is given is taken."""
@@ -405,6 +406,7 @@ def test_ranges_of_tasks():
         assert one.ranges != other.ranges
 
 
+@pytest.mark.slow
 def test_wider_ranges_lie_outside():
     """What the file of a training names stays as in training; where nothing of the task's wider ranges is left, nothing is judged."""
     wide = {"LogUniform": {"low": [0.2, 0.005, 0.0001], "high": [1.2, 0.005, 0.0001]}}
@@ -421,6 +423,7 @@ def test_wider_ranges_lie_outside():
     assert configured.environment(config, "out_of_range") is None
 
 
+@pytest.mark.slow
 def test_vision_of_an_older_training():
     """What a new one may not say is no reason not to judge what was trained with it."""
     config = {"task": "reach", "impl": "jax", "sees": "numbers", "env": {"config": {"vision": True}}}

@@ -154,6 +154,7 @@ def test_angles():
     np.testing.assert_allclose(got, turns, rtol=1e-6, atol=1e-6)  # of eight roundings by 6e-8, at most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "says"),
     [

@@ -90,6 +90,7 @@ def test_other_axes():
     assert arena.record.rules.sliding.names == ()
 
 
+@pytest.mark.slow
 def test_tables_and_parts():
     """Tables and parts have the priority here, so that no friction of an object helps; contacts of one friction are one."""
     arena = mja.TableArena(objects=[mja.Object("cube", condim=4)])

@@ -80,6 +80,7 @@ def test_what_the_solver_leaves_open(monkeypatch):
     assert touching > 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("iterations", "gives_up"), [(100, False), (10, False), (1, True)])
 def test_few_iterations(iterations, gives_up):
     """In C, one iteration is not enough for a heap; ten are."""

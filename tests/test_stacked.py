@@ -273,6 +273,7 @@ def test_tied_choice():
         np.testing.assert_array_equal(scene().decode(scene().encode(one, ranges), ranges).object_tables, on)
 
 
+@pytest.mark.slow
 def test_places_drawn_with_tables():
     """Every object that is there finds a place where it was drawn to stand, or is flagged; in C nothing is inside anything."""
     arena, (keys, params) = scene(), drawn(CHOICE, 32)

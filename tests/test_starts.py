@@ -162,6 +162,7 @@ def arm():
     return arena, params, jax.tree.map(lambda *x: jnp.stack(x), params, higher)
 
 
+@pytest.mark.slow
 def test_world_in_a_keyframe():
     """In C MuJoCo the robot is as `make_data` has it, and the ball on its table."""
     arena, _, two = arm()
@@ -174,6 +175,7 @@ def test_world_in_a_keyframe():
     assert arena.c_world(params)[1].joint("r_turn").qpos == 0
 
 
+@pytest.mark.slow
 def test_pictures_and_files_of_a_keyframe(tmp_path, monkeypatch):
     """All that shows or keeps a world shows and keeps it in the keyframe."""
     arena, params, two = arm()

@@ -98,6 +98,7 @@ def test_armature_of_what_is_absent():
 NUMBERS = {"center": "1 2 3", "extent": "4", "meansize": ".3", "meanmass": ".7", "meaninertia": ".02"}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:statistic attribute 'meaninertia' is deprecated")  # MJX's solver divides by it
 @pytest.mark.parametrize("names", [["center"], ["extent", "meanmass"], ["meansize", "meaninertia"], list(NUMBERS)])
 def test_what_the_mjcf_gives_stays(names):

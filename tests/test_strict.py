@@ -161,6 +161,7 @@ def test_precision_that_was_switched(monkeypatch):
         call(ValueError("got shape (64, 3)."))
 
 
+@pytest.mark.slow
 def test_data_of_another_precision():
     """Of a rollout, whose steps would give data of other types."""
     arena, keys = mja.TableArena(objects=[mja.Object("ball", "sphere", 0.06)]), mja.world_keys(0, range(N))

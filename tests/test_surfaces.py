@@ -101,6 +101,7 @@ def test_surfaces_are_upper_sides(arena):
             assert (size >= 0.8 * 2 * half[:2]).all(), name
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_worlds_are_compiled(arena, impl):
     """All numbers of all parts and objects others than nominal, objects on the next surface: each field as in the recompiled model."""
@@ -140,6 +141,7 @@ def test_placed_apart(arena):
             assert (np.abs(local) <= below.size[k] / 2 - p.object_full_sizes[k, :2].min() / 2 + 1e-5).all()
 
 
+@pytest.mark.slow
 def test_things_rest(arena):
     """In C, everything stays where it is put, drawers that are pulled out, too."""
     keys, params = drawn(arena, 3)

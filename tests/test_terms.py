@@ -224,6 +224,7 @@ def test_a_quantity_of_a_terms_own(monkeypatch):
         with_boards(WithShares).mj_model  # noqa: B018
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_a_new_term_is_written(impl):
     """Its elements, and the bounds and statistics that follow from them, are those of the recompiled world."""
@@ -315,6 +316,7 @@ class WithReaching(Parts):
         return (*super().terms, Reaching(tuple(t.body for t in self.tables)))
 
 
+@pytest.mark.slow
 def test_two_terms_with_reaches():
     """Statistics count the closed forms of both: those of the recompiled world, and of wrong ones the arena is refused."""
     arena = with_boards(WithReaching)
@@ -450,6 +452,7 @@ def test_small_inertias_are_written(impl):
     np.testing.assert_allclose(batch.model.body_inertia[0, arena.layout.object_body[0]], want, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_tied_draws_do_not_go_with_the_first_object():
     """Removing object "a" changes nothing about "b", tied or not."""
     ranges = mja.ArenaRanges(

@@ -121,6 +121,7 @@ CASES = {
     "bounded": lambda: of_xml(two(compiler='boundmass=".1"'), x=("body.mass", "b")),
     "tied": lambda: of_xml(two(more='<equality><weld body1="a" body2="b"/></equality>'), x=("body.active", "a")),
     "springdamper": lambda: of_xml(two(joint=DAMPER), x=("body.mass", "a")),
+    "its stiffness": lambda: of_xml(two(joint=DAMPER), x=("joint.stiffness", "a")),
     "spring": lambda: of_xml(
         two(more='<tendon><fixed stiffness="9"><joint joint="b" coef="1"/></fixed></tendon>'),
         x=("joint.springref", "b"),

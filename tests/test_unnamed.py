@@ -44,6 +44,7 @@ def varied(arena, *attributes, **more):
     return arena
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_all_kinds(impl):
     """Every kind has names by what its elements belong to, and varies as MuJoCo compiles it."""
@@ -225,6 +226,7 @@ def test_merged():
     assert {who: found[who] for who in same} == {who: alone[who] for who in same}
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_objects(impl):
     """Geoms without a name of an object's file vary in what the object does not decide, and are those that MuJoCo compiles."""

@@ -79,6 +79,7 @@ def drawn(arena, name):
     return jax.tree.map(np.asarray, params)
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 @pytest.mark.parametrize("name", ["wedge", "tent", "brick"])
 def test_shapes(singles, together, name, impl):

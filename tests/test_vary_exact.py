@@ -162,6 +162,7 @@ def test_a_tendon_that_gets_a_spring(order):
                 _ = arena.mj_model
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["site.pos", "site.rpy"])
 def test_cranks(name):
     """Of sliders and cranks, which MJX has on Warp."""
@@ -273,7 +274,7 @@ REFUSED = {
     "a muscle's range": (
         MUSCLE, dr.Term("site.pos", "s"), "warp",
         "`arena.spec`: actuator_lengthrange of actuator 'm' would be stale in other worlds: it follows from `x` (of 'x'), and the compiler "
-        "finds it by a simulation: give the muscle a `lengthrange`.",
+        "simulates it, or takes it from the limits of the joint: give the actuator a `lengthrange`.",
     ),
     "a damping on a ball": (
         ON_BALL, dr.Term("body.mass"), "warp",
@@ -388,6 +389,7 @@ KEYS = """<mujoco><worldbody><body name="mo" mocap="true" pos="0 0 1"><geom size
 </mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keyframe", ["fast", "there", "turned"])
 @pytest.mark.filterwarnings("ignore:.*starts there in all worlds:UserWarning")
 def test_keyframes_that_leave_places_out(keyframe, impl):

@@ -28,6 +28,7 @@ SCENE = """<mujoco><asset>
 <geom name="disc" size=".1"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_densities_and_masses(impl):
     """Of solid, given and hollow geoms, while they are turned and of other sizes."""
@@ -61,6 +62,7 @@ def test_masses_carry_their_inertia(impl):
             np.testing.assert_allclose(inertia, share * np.array([box, [0.01, 0.02, 0.025]]), rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_geoms_that_weigh_by_their_group(impl):
     """An `inertiagrouprange` decides which geoms weigh, in all worlds alike."""
@@ -170,6 +172,7 @@ def test_payloads(impl):
         np.testing.assert_allclose(pseudo_inertia(*body(got, index)), want, atol=3e-6 * np.abs(want).max())
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_what_is_seen(impl):
     """Intrinsics, in pixels, too; textures, materials and kinds of light by choice."""
@@ -276,6 +279,7 @@ def test_choices_are_no_intervals():
         arena.check_ranges(mja.ArenaRanges(terms={"texture": mja.Choice([0, 7])}))
 
 
+@pytest.mark.slow
 @pytest.mark.slow_on("warp")
 def test_far_away_parameters_stay_exact(impl):
     """Heavy bodies become light ones, and small ones large."""

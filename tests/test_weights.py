@@ -52,6 +52,7 @@ SINGULAR = """<mujoco><default><geom contype="0" conaffinity="0"/></default><wor
   <actuator><motor joint="c"/><motor joint="a"/><motor site="s" gear="1 0 2 0 3 0"/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("armature", ["1e-3", "1e-6", "0"])
 def test_singular_tree(armature):
     """Two hinges in one place, which only their armatures hold, as in C, and none of it reaches other trees.
@@ -94,6 +95,7 @@ MASSLESS = [(bodies, NEITHER) for bodies in ([1], [2], [3], [4, 5], [6], [1, 2, 
 MASSLESS += [(bodies, NO_MASS) for bodies in ([1], [6], [1, 6])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bodies", "fields"), MASSLESS)
 def test_without_mass(bodies, fields):
     """Bodies without mass: C divides by `mjMINVAL`."""
@@ -148,6 +150,7 @@ def test_gradients_are_those_of_c(field, row, step):
     assert slope[row] == pytest.approx((beside(step) - beside(-step)) / (2 * step), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_yaw_alone_moves_acceleration():
     """An actuator along the parent's axes turns with no object: where yaws alone vary, `actuator_acc0` is the compiler's all the same."""
     arena = mja.TableArena(objects=[mja.Object("brick", "box", (0.1, 0.06, 0.04), rot=0.3)])

@@ -189,6 +189,7 @@ def depth_by_axes(offset, rot, size):
     return min(depths)
 
 
+@pytest.mark.slow
 def test_depths():
     """Of 10,000 random worlds: on the device and on the host as axis by axis; flush tables only touch."""
     offsets, rots, sizes = random_tables(10_000)
@@ -242,6 +243,7 @@ def test_overlap_is_that_of_mujoco():
     assert 40 < n < 160
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_tables", [2, 3, 4, 5])
 def test_pairs_on_the_device(n_tables):
     """Each pair is looked at: one that overlaps is flagged by the device's pairs as by the host's, unless it may or one is absent."""

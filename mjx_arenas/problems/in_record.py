@@ -4,7 +4,7 @@ IN_RECORD = {
     # What the compiler, or MJX, would do behind the parameters' back.
     "pixels_in_data": "{at}: texture {got} has its pixels in `data`, which MJCF cannot hold: write them into a file, and give the texture "
     "this `file`.",
-    "compiler_removes": "{at}: fusestatic and discardvisual would remove parts of the tables: switch them off.",
+    "compiler_removes": "{at}: fusestatic and discardvisual would remove bodies and geoms that worlds may need: switch them off.",
     "compiler_weighs": "{at}: {names} would change the masses of objects, which parameters decide: switch them off, and give an <inertial> "
     "to each body of the MJCF that needs them.",
     "compiler_weighs_all": "{at}: {names} would make the masses of all bodies follow from `{varied}`: switch them off.",

@@ -46,8 +46,9 @@ from mjx_arenas.write.scene import INERTIAL, Given, Scene
 WHY = {
     "actuator_biasprm": "the compiler makes a damping of its `dampratio`: give it a `kv`",
     "actuator_ctrlrange": "the compiler takes it from the joint (`inheritrange`): give the actuator a `ctrlrange`",
-    "actuator_lengthrange": "the compiler finds it by a simulation: give the muscle a `lengthrange`",
+    "actuator_lengthrange": "the compiler simulates it, or takes it from the limits of the joint: give the actuator a `lengthrange`",
     "dof_damping": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
+    "jnt_stiffness": "the compiler makes it of the joint's `springdamper`: give the joint a `stiffness` and a `damping`",
     "geom_fluid": "the compiler makes coefficients of its drag: leave out its `fluidshape`",
     "tendon_lengthspring": "the compiler takes it from where the tendon's ends stand: give the tendon a `springlength`",
 }

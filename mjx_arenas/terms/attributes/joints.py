@@ -42,7 +42,7 @@ JOINT_TRN = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPAREN
 def limited(flag: str, what: str) -> Callable[[mujoco.MjModel, int], str]:
     """A reason not to vary limits that are off."""
     return lambda model, index: (
-        "" if of_model(model, flag)[index] else f"it has no {what}: give it a wide one in the MJCF"
+        "" if of_model(model, flag)[index] else f"it has no {what} in force: give it a wide one in the MJCF"
     )
 
 
