@@ -17,7 +17,7 @@ from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
 from mjx_arenas.problems import messages
-from mjx_arenas.record import comparing, proof
+from mjx_arenas.record import proof
 from mjx_arenas.record.layout import Layout
 from mjx_arenas.record.record import Record
 from mjx_arenas.rules import (
@@ -34,7 +34,7 @@ from mjx_arenas.rules import (
 from mjx_arenas.sample import tops
 from mjx_arenas.sample.sampling import Nominal, world_keys
 from mjx_arenas.sim import programs, starts
-from mjx_arenas.spec import calls, specs
+from mjx_arenas.spec import calls, comparing, specs
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.terms.footing import footings
 from mjx_arenas.terms.parts import Parts

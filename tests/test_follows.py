@@ -12,8 +12,8 @@ from oracle import STRUCTURE_MAY_DIFFER, from_compiled
 import mjx_arenas as mja
 from mjx_arenas.build import assemble
 from mjx_arenas.params.params import QUANTITIES
-from mjx_arenas.record import comparing
 from mjx_arenas.record.elsewhere import elsewhere
+from mjx_arenas.spec import comparing
 from mjx_arenas.write import writer
 
 JOINT, TENDON, SITE = (getattr(mujoco.mjtTrn, f"mjTRN_{kind}") for kind in ("JOINT", "TENDON", "SITE"))

@@ -1,11 +1,14 @@
 """Worlds against edits of the MJCF as it was given, compiled by MuJoCo alone: what `vary` writes into `arena.spec` cannot hide there."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
 
 import mjx_arenas as mja
 from mjx_arenas import dr
+from mjx_arenas.terms.attributes import ATTRIBUTES
 
 ROUNDED = 8 * 2.0**-23  # a few roundings of a number, relative to it
 BODY = '<body name="{0}" pos="{1} 0 1"><joint name="j{0}" axis="0 1 0"/><geom size=".02"/></body>'
@@ -21,7 +24,6 @@ MASSLESS = {
         "top": '<compiler inertiagrouprange="0 2"/>',
         "stands": BARE.format('<geom size=".1" group="3"/>'),
     },
-    "in a frame": {"stands": '<frame pos="0 0 .2" euler="0 0 30">' + BARE.format("<site/>") + "</frame>"},
     "an end that is held": {
         "hung": BARE.format('<camera mode="trackcom"/>'),
         "more": '<equality><connect body1="it" body2="free" anchor="0 0 0"/></equality>',
@@ -50,8 +52,6 @@ def test_bodies_without_mass(kind):
     for w in range(3):
         made, spec = arena.compile(batch.world(w)), mujoco.MjSpec.from_string(xml)
         element, at = spec.body("it"), made.body("it")
-        if element.frame is not None:
-            element.set_frame(element.parent.add_frame())
         element.pos, element.quat = at.pos, at.quat
         recompiled[w] = spec.compile()
         for name in ("body_ipos", "body_iquat", "body_invweight0", "cam_poscom0", "body_sameframe"):
@@ -62,13 +62,18 @@ def test_bodies_without_mass(kind):
     assert max(told.values(), default=0.0) < ROUNDED, told
 
 
-def test_an_inertial_without_mass_where_the_body_is():
-    """It cannot be told from the one that the compiler makes, which goes where the body goes."""
-    inertial = '<body name="it"><inertial mass="0" pos="0 0 0" diaginertia="0 0 0"/></body>'
-    arena = mja.Arena.from_xml(scene(stands=inertial))
-    with pytest.raises(
-        ValueError, match=r"cannot vary, as its <inertial> has no mass and is where the body is: leave it out\.$"
-    ):
+INERTIAL = '<body name="it"><inertial mass="0" pos="0 0 0" diaginertia="0 0 0"/></body>'
+UNCLEAR = {
+    "its <inertial> has no mass and is where the body is: leave it out": INERTIAL,
+    "it has no mass and is in a <frame>: take it out of this, or give it a mass": f'<frame pos="0 0 .2">{BARE.format("")}</frame>',
+}
+
+
+@pytest.mark.parametrize("why", UNCLEAR)
+def test_inertials_without_mass_that_are_refused(why):
+    """One that cannot be told from the one that the compiler makes, and one that the compiler makes of numbers in a frame."""
+    arena = mja.Arena.from_xml(scene(stands=UNCLEAR[why]))
+    with pytest.raises(ValueError, match=re.escape(f"cannot vary, as {why}.")):
         arena.vary(pos=dr.Term("body.pos", "it"))
 
 
@@ -138,3 +143,13 @@ def test_keyframes_of_mocap_bodies_in_c_batch():
                 getattr(ours, name), getattr(theirs, name), rtol=ROUNDED, atol=1e-7, err_msg=name
             )
         assert not np.allclose(theirs.key_mpos[0], theirs.key_mpos[1])
+
+
+def test_the_nominal_model_stays(monkeypatch):
+    """What `vary` writes into a spec is compared with the model before: without the rule for aligned bodies, this refuses them, too."""
+    row = ATTRIBUTES["body.mass"]._replace(refused_in_spec=None)
+    monkeypatch.setitem(ATTRIBUTES, "body.mass", row)
+    box = '<body name="it"><freejoint align="true"/><geom type="box" size=".1 .05 .02" pos=".1 0 0"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=box))
+    with pytest.raises(ValueError, match=r"^`arena\.spec`: what `vary` writes into it would change body_pos, .*qpos0"):
+        arena.vary(it=dr.Term("body.mass", "it"))

@@ -14,7 +14,7 @@ import mjx_arenas as mja
 from mjx_arenas import dr
 from mjx_arenas.named import RATIO, WEIGHT
 from mjx_arenas.preflight.leaves import named_leaves
-from mjx_arenas.record.comparing import NOT_READ
+from mjx_arenas.spec.comparing import NOT_READ
 from mjx_arenas.terms.attributes import KINDS
 from mjx_arenas.terms.attributes.attribute import only_on_warp
 from mjx_arenas.terms.attributes.fixed import FIXED, ROWS

@@ -18,9 +18,9 @@ import mjx_arenas as mja
 from mjx_arenas import dr, furniture
 from mjx_arenas.furniture.part import DAMPING, whole
 from mjx_arenas.params.params import with_values
-from mjx_arenas.record import comparing
 from mjx_arenas.record.elsewhere import elsewhere
 from mjx_arenas.sim import left_out
+from mjx_arenas.spec import comparing
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.attributes.attribute import IMPEDANCE, SIGNS
 

@@ -13,7 +13,7 @@ from mjx_arenas.build import inertials, points
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import automatic, masses, specs
+from mjx_arenas.spec import automatic, comparing, masses, specs
 from mjx_arenas.spec.objects import VARIANTS
 from mjx_arenas.terms.attributes import ATTRIBUTES
 from mjx_arenas.terms.elements import Elements, ids_of, in_spec
@@ -62,12 +62,7 @@ def vary(
     chosen = _selected(spec, model, parts, nominal, terms)
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
-    for name, term in terms.items():
-        prepare, kind = ATTRIBUTES[term.attribute].prepare, term.attribute.partition(".")[0]
-        if prepare is not None:
-            for element, index in zip(chosen[name], ids_of(model, kind, chosen[name]), strict=True):
-                prepare(spec, in_spec(spec, kind, element), model, int(index))
-    base = specs.compiled(spec.copy(), "arena.spec")
+    base = _prepared(spec, model, terms, chosen)
     made = tuple(
         Elements(
             name,
@@ -89,6 +84,30 @@ def vary(
     without = parts.varied[: -len(made)]
     points.warn_of_ended(*(specs.compiled(points.end(spec.copy(), v), "arena.spec") for v in (without, parts.varied)))
     return spec, parts, nominal
+
+
+def _prepared(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, terms: Mapping[str, dr.Term], chosen: Mapping[str, tuple[str, ...]]
+) -> mujoco.MjModel:
+    """Prepares the elements of terms in a spec, of which the nominal model stays the same, and compiles it.
+
+    Raises:
+        ValueError: the nominal model would be another one.
+    """
+    for name, term in terms.items():
+        prepare, kind = ATTRIBUTES[term.attribute].prepare, term.attribute.partition(".")[0]
+        if prepare is not None:
+            for element, index in zip(chosen[name], ids_of(model, kind, chosen[name]), strict=True):
+                prepare(spec, in_spec(spec, kind, element), model, int(index))
+    base = specs.compiled(spec.copy(), "arena.spec")
+    edited = {name for name in comparing.differing(model, base) if not name.startswith("name")} - _SHORT_CUTS
+    if edited:
+        raise validation.error([problem("arena.spec", "nominal_changed", None, None, names=sorted(edited))])
+    return base
+
+
+_SHORT_CUTS = {"body_simple", "dof_simplenum"}
+"""What the compiler takes a body for, of which `points` tells."""
 
 
 def _taken(name: str, parts: Parts, taken: Collection[str]) -> Problem:

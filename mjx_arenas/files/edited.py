@@ -12,8 +12,8 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.build.assemble import xml_tree
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
-from mjx_arenas.record.comparing import STATISTICS
 from mjx_arenas.spec import specs
+from mjx_arenas.spec.comparing import STATISTICS
 
 NAME = "spec.xml"
 _OF_HULLS = ("mesh_graph", "mesh_poly", "mesh_extrema")  # which a spec keeps of meshes that collide no more

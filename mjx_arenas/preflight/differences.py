@@ -13,8 +13,8 @@ from mjx_arenas.keywords import with_known_arguments
 from mjx_arenas.preflight.kept import Kept
 from mjx_arenas.preflight.leaves import count, named_leaves, path_name
 from mjx_arenas.problem import Told, problem
-from mjx_arenas.record.comparing import NOT_READ
 from mjx_arenas.rules import validation
+from mjx_arenas.spec.comparing import NOT_READ
 
 _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data", "ngravcomp"}  # the first: counts of `MjModel`
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0

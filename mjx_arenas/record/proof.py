@@ -17,7 +17,13 @@ from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.primitives import PRIMITIVES, around
 from mjx_arenas.problem import problem
 from mjx_arenas.record import refusals
-from mjx_arenas.record.comparing import (
+from mjx_arenas.record.elsewhere import elsewhere as elsewhere
+from mjx_arenas.record.layout import Layout
+from mjx_arenas.rules import validation
+from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
+from mjx_arenas.solids import inertials
+from mjx_arenas.spec import specs, weighed
+from mjx_arenas.spec.comparing import (
     EXACT,
     NOT_READ,
     STATISTICS,
@@ -29,12 +35,6 @@ from mjx_arenas.record.comparing import (
     far_apart,
     fields,
 )
-from mjx_arenas.record.elsewhere import elsewhere as elsewhere
-from mjx_arenas.record.layout import Layout
-from mjx_arenas.rules import validation
-from mjx_arenas.sample.variants import NUMBERS, with_own_numbers
-from mjx_arenas.solids import inertials
-from mjx_arenas.spec import specs, weighed
 from mjx_arenas.spec.names import element
 from mjx_arenas.spec.quick import boxed
 from mjx_arenas.terms.owned import Owned, element_name

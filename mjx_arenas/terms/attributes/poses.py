@@ -21,7 +21,7 @@ from mjx_arenas.terms.attributes.attribute import (
     of_model,
     reader,
 )
-from mjx_arenas.terms.attributes.prepare import not_simple
+from mjx_arenas.terms.attributes.prepare import not_simple, weighs
 
 
 def turned(field: str) -> Callable[[Array, mujoco.MjModel, np.ndarray], Array]:
@@ -146,7 +146,12 @@ def _unweighed(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 
 
 def _inertial(spec: mujoco.MjSpec, element: Any) -> str:
-    """Why a body cannot move whose own inertial cannot be told from the one that the compiler gives a body without mass."""
+    """Why a body without mass cannot move.
+
+    The compiler gives one without an inertial another, whose pose is in numbers that of the body, in the body's <frame>.
+    """
+    if not element.explicitinertial and element.frame is not None and not any(map(weighs, element.geoms)):
+        return "it has no mass and is in a <frame>: take it out of this, or give it a mass"
     own = element.explicitinertial and element.mass == 0
     same = np.array_equal(element.ipos, element.pos) and np.array_equal(element.iquat, element.quat)
     return "its <inertial> has no mass and is where the body is: leave it out" if own and same else ""
