@@ -146,7 +146,7 @@ MODELS = {
         ),
         r"^`arena\.spec`: texture 't' has its pixels in `data`, which MJCF cannot hold: write them into a file, and give the texture",
     ),
-    "fusestatic": (lambda: in_scene('<compiler fusestatic="true"/>'), "`spec.compiler`: fusestatic .* remove parts"),
+    "fusestatic": (lambda: in_scene('<compiler fusestatic="true"/>'), "`spec.compiler`: fusestatic .* remove bodies"),
     "boundmass": (
         lambda: in_scene('<compiler boundmass=".5" boundinertia=".1"/>', objects=CUBE),
         "`spec.compiler`: boundmass, boundinertia would change the masses of objects",

@@ -106,7 +106,19 @@ ALIGNED = """<mujoco><compiler alignfree="{}"/><worldbody><body name="b" pos="0 
 <geom name="g" type="box" size=".1 .2 .3" pos=".1 .2 .3" euler="10 20 30"/><geom name="h" size=".1"/><site name="s" pos=".1 0 0"/>
 <camera name="c"/><light name="l"/></body></worldbody></mujoco>"""
 ON_ALIGNED = {
-    **dict.fromkeys(["body.pos", "body.rpy", "body.ipos", "body.payload", "body.pseudo_inertia"], "b"),
+    **dict.fromkeys(
+        [
+            "body.mass",
+            "body.mass_alone",
+            "body.inertia",
+            "body.pos",
+            "body.rpy",
+            "body.ipos",
+            "body.payload",
+            "body.pseudo_inertia",
+        ],
+        "b",
+    ),
     **dict.fromkeys(["geom.pos", "geom.rpy", "geom.size", "geom.density"], "g"),
     **{"site.pos": "s", "site.rpy": "s", "camera.pos": "c", "camera.rpy": "c", "light.pos": "l", "light.dir": "l"},
 }
@@ -126,7 +138,7 @@ def test_aligned(attribute):
     arena.vary(x=dr.Term(attribute, name))
 
 
-@pytest.mark.parametrize("attribute", ["body.mass", "body.gravcomp", "geom.friction", "body.start_pos"])
+@pytest.mark.parametrize("attribute", ["body.gravcomp", "geom.friction", "body.start_pos"])
 def test_not_of_the_frame(attribute):
     """What has no part in the frame of an aligned body varies."""
     arena = mja.Arena.from_xml(ALIGNED.format("false", "true"))

@@ -100,9 +100,10 @@ def _prepared(
             for element, index in zip(chosen[name], ids_of(model, kind, chosen[name]), strict=True):
                 prepare(spec, in_spec(spec, kind, element), model, int(index))
     base = specs.compiled(spec.copy(), "arena.spec")
-    edited = {name for name in comparing.differing(model, base) if not name.startswith("name")} - _SHORT_CUTS
+    edited = comparing.differing(model, base) - comparing.NOT_READ - _SHORT_CUTS
+    edited = [name for name in sorted(edited) if not name.startswith("name")]
     if edited:
-        raise validation.error([problem("arena.spec", "nominal_changed", None, None, names=sorted(edited))])
+        raise validation.error([problem("arena.spec", "nominal_changed", None, None, names=edited)])
     return base
 
 

@@ -84,6 +84,8 @@ GENERAL = {
     "no_robot": "{at}: the arena has nothing that can vary whose name begins with {got}.",
     "term": "{at} must be a dr.Term, got {got}.",
     "term_name": "{at} must be a valid Python name, as it is the name of a quantity.",
+    "massless_inertial": "{at} must have no <inertial> without mass where its body is, got that of body '{got}': leave it out, and the "
+    "compiler makes the same one.",
     "nominal_changed": "{at}: what `vary` writes into it would change {names} of the nominal model: give what varies, and what it hangs "
     "on, explicit numbers, in plain elements without rules of the compiler.",
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",

@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.geometry import Array, array_module
+from mjx_arenas.problem import Told, problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.quaternions import quat_mul
 from mjx_arenas.terms.attributes.attribute import (
     GEOM,
@@ -106,6 +108,8 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
         if kind == "light":
             element.dir = model.light_dir[index]
         if kind == "body" and _unweighed(model, np.array([index])).all():
+            if element.explicitinertial:  # which cannot be told from the compiler's
+                raise error([problem("arena.spec", "massless_inertial", None, Told(element.name))])
             not_simple(element)
         put(element, kind, model, index, of_model(model, f"{prefix}_pos")[index], quat)
 
@@ -152,9 +156,7 @@ def _inertial(spec: mujoco.MjSpec, element: Any) -> str:
     """
     if not element.explicitinertial and element.frame is not None and not any(map(weighs, element.geoms)):
         return "it has no mass and is in a <frame>: take it out of this, or give it a mass"
-    own = element.explicitinertial and element.mass == 0
-    same = np.array_equal(element.ipos, element.pos) and np.array_equal(element.iquat, element.quat)
-    return "its <inertial> has no mass and is where the body is: leave it out" if own and same else ""
+    return ""
 
 
 def _edge(model: mujoco.MjModel, index: int) -> str:
