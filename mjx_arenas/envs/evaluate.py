@@ -22,10 +22,8 @@ from mjx_arenas.rules import validation
 from mjx_arenas.sim import data as data_
 
 HELD_OUT = 10_000_019  # seed of the arenas that policies are judged on
-UNSEEN = (
-    HELD_OUT,
-    HELD_OUT + 1,
-)  # seeds of worlds that are drawn once to judge policies on, of which a training has one at most
+UNSEEN = (HELD_OUT, HELD_OUT + 1)
+"""Seeds of worlds that are drawn once to judge policies on, of which a training has one at most."""
 MANY = 0.1  # share of worlds of which something is reported, from which on a warning says so
 Policy = Callable[[Any, Any], tuple[jax.Array, Any]]
 _CHECK = "mjx_arenas.check(arena, ranges) looks for causes that do not depend on the policy"
@@ -197,9 +195,8 @@ def episode(env: Any, policy: Policy, keys: jax.Array, record: Callable[[Any], A
     return run(keys)
 
 
-_TAG = (
-    0x504F4C49  # large, because `jax.random.split` of a world's key gives the keys that `fold_in` gives of 0, 1, 2, ...
-)
+_TAG = 0x504F4C49
+"""Large, because `jax.random.split` of a world's key gives the keys that `fold_in` gives of 0, 1, 2, ..."""
 
 
 def _actions(policy: Policy, obs: Any, keys: jax.Array, t: Any, env: Any) -> jax.Array:

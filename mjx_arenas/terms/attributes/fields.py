@@ -11,9 +11,8 @@ def attribute_of(field: str) -> str | None:
     wanted = _plain(field)
     first = {_plain(one.targets[0].field): name for name, one in reversed(ATTRIBUTES.items()) if one.targets}
     rows = [(name, target) for name, one in reversed(ATTRIBUTES.items()) for target in one.targets]
-    any_of = {
-        _plain(target.field): name for name, target in sorted(rows, key=lambda row: row[1].of is None)
-    }  # of all elements
+    of_all_last = sorted(rows, key=lambda row: row[1].of is None)  # which count
+    any_of = {_plain(target.field): name for name, target in of_all_last}
     named = {_plain(name): name for name in ATTRIBUTES}
     for found in (named, first, any_of):
         if wanted in found:
