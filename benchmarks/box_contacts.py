@@ -6,6 +6,7 @@ MuJoCo finds (as_in_c), on the same unseen arenas. Then steps the environment of
 
 import argparse
 import contextlib
+import importlib.util
 import json
 import pathlib
 import sys
@@ -34,6 +35,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=pathlib.Path, required=True, help="file for the results")
     argv = sys.argv[1:] if argv is None else argv
     options = parser.parse_args(argv)
+    for folder in options.folders:
+        if not (folder / "config.json").is_file():
+            parser.error(f"FOLDER must be the folder of a training, got {str(folder)!r}.")
+    if importlib.util.find_spec("mujoco_playground") is None:
+        parser.error("Policies need mujoco_playground: pip install 'mjx_arenas[train]'.")
     here = measure.environment()  # before this process takes the device
     gpu.leave_room("warp")
     from mjx_arenas import policies

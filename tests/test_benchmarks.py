@@ -233,3 +233,10 @@ def test_box_contacts(tmp_path):
             assert bool(flags & box_contacts.NATIVE) == as_in_c
     with pytest.raises(ValueError, match=r"push is no training of lift or pick_and_place in their own arenas\.$"):
         box_contacts.environment(tmp_path / "push", "as_in_c")
+
+
+def test_box_contacts_of_nothing(tmp_path, capsys):
+    """A folder that is no training's is answered in a sentence."""
+    with pytest.raises(SystemExit):
+        box_contacts.main([str(tmp_path), "--json", str(tmp_path / "x.json")])
+    assert f"FOLDER must be the folder of a training, got '{tmp_path}'. See" in capsys.readouterr().err
