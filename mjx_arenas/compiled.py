@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import content
-from mjx_arenas.build import aims, assemble, finish, from_mjcf
+from mjx_arenas.build import aims, assemble, finish, from_mjcf, mjcf
 from mjx_arenas.keywords import with_known_methods
 from mjx_arenas.params.params import ArenaParams, ArenaRanges, Quantity, canonical
 from mjx_arenas.problem import problem
@@ -207,7 +207,7 @@ class Compiled(Shown):
         """MJCF of the nominal arena."""
         spec = self.own_spec()
         self._parts.presence.edit(spec, self._nominal)
-        return assemble.world_xml(spec, self._parts)
+        return mjcf.proven(spec, "arena.spec")
 
     @one_at_a_time
     def own_spec(self) -> mujoco.MjSpec:

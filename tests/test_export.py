@@ -18,6 +18,7 @@ import worlds
 
 import mjx_arenas as mja
 from mjx_arenas.files import export
+from mjx_arenas.spec import specs
 
 STEPS = 20  # of 2 ms: objects fall 8 mm
 PLAIN = """
@@ -220,3 +221,43 @@ def test_names_beyond_ascii(tmp_path, monkeypatch):
     arena = mja.TableArena(objects=[mja.Object("Würfel")])
     arena.export(arena.nominal_params(), tmp_path / "w")
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "w" / "world.xml")).body("Würfel").id > 0
+
+
+MUSCLE = """<mujoco><compiler><lengthrange mode="none"/></compiler>
+  <worldbody><body pos="0 0 1"><joint name="hinge" range="-1 1"/><geom size="0.1"/></body></worldbody>
+  <actuator><muscle joint="hinge"/></actuator></mujoco>"""
+
+
+def test_lost_in_mjcf(tmp_path):
+    """What MuJoCo's writer of MJCF leaves out, such as this mode, is no other world in silence: it is refused, or exported compiled."""
+    arena = mja.TableArena(xml=MUSCLE)
+    assert not arena.mj_model.actuator_lengthrange.any()
+    params = arena.nominal_params()
+    says = "would compile to another actuator_lengthrange: `arena.export.*mjb"
+    with pytest.raises(ValueError, match=f"`params`: .*{says}"):
+        arena.to_xml(params)
+    with pytest.raises(ValueError, match=f"`params`: .*{says}"):
+        arena.export(params, tmp_path / "xml")
+    with pytest.raises(ValueError, match=f"`arena.spec`: .*{says}"):
+        arena.xml  # noqa: B018
+    assert not (tmp_path / "xml").exists()
+    arena.export(params, tmp_path / "mjb", format="mjb")
+    exported = mujoco.MjModel.from_binary_path(str(tmp_path / "mjb" / "world.mjb"))
+    assert not exported.actuator_lengthrange.any()
+
+
+@pytest.mark.parametrize("lost", ["a friction of 0.3 % less", "an option"])
+def test_any_loss_is_noticed(monkeypatch, lost):
+    """A writer that changes a number by 0.3 %, or an option."""
+    arena, as_written = mja.TableArena(objects=[mja.Object("cube")]), specs.to_xml
+
+    def losing(spec):
+        if lost == "an option":
+            spec.option.iterations += 1
+        else:
+            spec.body("cube").first_geom().friction[0] *= 0.997
+        return as_written(spec)
+
+    monkeypatch.setattr(specs, "to_xml", losing)
+    with pytest.raises(ValueError, match="another " + ("opt.iterations" if lost == "an option" else "geom_friction")):
+        arena.to_xml(arena.nominal_params())

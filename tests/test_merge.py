@@ -10,8 +10,6 @@ import mjx_arenas as mja
 
 MOVES = ((2.0, 0.3, 0.1), 0.7), ((0.4, 5.0, -0.2), -1.1), ((-3.0, 1.0, 0.3), 2.3)
 BOX = mujoco.mjtGeom.mjGEOM_BOX
-NINE_DIGITS = 5e-9  # of a table's number in MJCF, relative
-SIX_DIGITS = 4e-5  # of what else stands there [m]: three frames, each turned to 2e-6 rad, at up to 7 m
 
 
 def one(post):
@@ -56,7 +54,7 @@ def test_merged_merged_arenas(said_by):
     makers = {"mj_model": lambda: arena.mj_model, "compile": lambda: arena.compile(params)}
     makers["to_xml"] = lambda: mujoco.MjModel.from_xml_string(arena.to_xml(params))
     data = mujoco.MjData(makers[said_by]())
-    tolerance = {"rtol": NINE_DIGITS if said_by == "to_xml" else 0, "atol": 1e-9}
+    tolerance = {"rtol": 0, "atol": 1e-9}
     mujoco.mj_kinematics(data.model, data)
     for level in range(4):
         prefix = "b_" * level
@@ -69,5 +67,4 @@ def test_merged_merged_arenas(said_by):
         middle = pos + turn @ [0.2, 0.1, 0.025]
         np.testing.assert_allclose(data.body(f"{prefix}cube").xpos, middle, **tolerance)
         post = data.geom(f"{prefix}post{3 - level}").xpos
-        apart = SIX_DIGITS if said_by == "to_xml" else 1e-9
-        np.testing.assert_allclose(post, expected("post", level)[0], rtol=0, atol=apart)
+        np.testing.assert_allclose(post, expected("post", level)[0], **tolerance)

@@ -5,13 +5,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from typing import Any
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from mjx_arenas import shapes
-from mjx_arenas.build import order, resting, slots
+from mjx_arenas.build import resting, slots
 from mjx_arenas.furniture import surfaces
 from mjx_arenas.params.params import ArenaParams, named
 from mjx_arenas.problem import problem
@@ -210,60 +209,6 @@ def place_in_keyframes(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, o
             qpos = np.array(key.qpos)
             qpos[object_qpos] = poses
             key.qpos = qpos
-
-
-def xml_tree(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, ElementTree.Element]:
-    """A compiled copy of a spec, whose files have absolute paths, and its MJCF."""
-    spec = spec.copy()
-    specs.make_paths_absolute(spec, "arena.spec")
-    order.put_frames_in_order(spec)
-    spec.compile()
-    return spec, ElementTree.fromstring(specs.to_xml(spec))
-
-
-def world_xml(spec: mujoco.MjSpec, parts: Parts) -> str:
-    """MJCF of a compiled spec, with the digits of float32 at least for tables, parts and objects; MuJoCo may write six."""
-    spec, root = xml_tree(spec)
-    elements = {(e.tag, e.get("name")): e for part in ("worldbody", "keyframe") for e in root.findall(f"{part}//*")}
-
-    def write(kind: str, name: str, *attributes: str) -> None:
-        element = getattr(spec, kind)(name)
-        if element is not None:  # not absent
-            for attribute in attributes:
-                numbers = np.atleast_1d(getattr(element, attribute))
-                digits = 17 if kind == "key" else 9  # C's states are in double precision
-                elements[kind, name].set(attribute, " ".join(f"{x:.{digits}g}" for x in numbers))
-
-    for body in (*(t.body for t in parts.tables), *(m.body for m in parts.mounts), *(o.name for o in parts.objects)):
-        write("body", body, "pos", "quat")
-    for names in parts.tables:
-        write("site", names.top, "pos", "size")
-        write("geom", names.collision, "size", "friction")
-        write("geom", names.visual, "size")
-        for leg in names.legs:
-            write("geom", leg, "pos", "size")
-    for obj in [one for whole in parts.objects for one in whole.slots or (whole,)]:
-        if obj.type != "mjcf":
-            sized = ("quat", "size") if obj.is_primitive else ()
-            write("geom", obj.geom, "friction", "mass", "rgba", *sized)
-    for term in parts.furniture:
-        write("body", term.name, "pos", "quat")
-        for name in term.joints:
-            joint = spec.joint(name)
-            slides = joint is not None and joint.type == mujoco.mjtJoint.mjJNT_SLIDE
-            write(
-                "joint", name, "pos", "axis", "damping", "frictionloss", *["range"] * slides
-            )  # of hinges in degrees here
-        for name in term.geoms:
-            write("geom", name, "pos", "quat", "size", "friction", "rgba")
-        for mount in term.mounts:
-            write("body", mount.body, "pos", "quat")
-    for one in parts.follows:
-        write("geom", one.geom, "pos", "quat", "size")
-    for name, element in [(name, e) for (kind, name), e in elements.items() if kind == "key" and name]:
-        write("key", name, *sorted(element.attrib.keys() - {"name"}))
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode")
 
 
 def warn_of_nominal_places(

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjx_arenas.build import assemble
+from mjx_arenas.build import mjcf
 from mjx_arenas.checks import causes, kept_rules, watch, watch_c
 from mjx_arenas.checks.causes import CAUSES, Failure
 from mjx_arenas.checks.engines import Run
@@ -63,7 +63,7 @@ def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: R
         states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
     names = {"tables": record.table_names, "objects": list(record.object_names)}
     noted = {"seed": about["seed"], "world": about["world"], **names}
-    xml = None if spec is None else assemble.world_xml(spec, record.parts)
+    xml = None if spec is None else mjcf.text(spec)
     with whole(folder, over=is_bundle) as unfinished:
         export.write(unfinished, xml, dict(record.spec.assets), run.params, noted)
         np.savez_compressed(unfinished / "states.npz", **states)

@@ -3,13 +3,12 @@
 import pathlib
 import tempfile
 from collections.abc import Mapping
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from mjx_arenas.arena import Arena
-from mjx_arenas.build.assemble import xml_tree
+from mjx_arenas.build import mjcf
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
 from mjx_arenas.spec import specs
@@ -50,7 +49,7 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
 
 def files_of(spec: mujoco.MjSpec) -> dict[str, bytes]:
     """A spec as MJCF, and the files that it needs, by their paths in a folder."""
-    return with_copies(_text(spec), dict(spec.assets), NAME)
+    return with_copies(mjcf.text(spec), dict(spec.assets), NAME)
 
 
 def fill(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
@@ -81,19 +80,3 @@ def _close(a: np.ndarray, b: np.ndarray) -> bool:
     if a.shape != b.shape or a.dtype.kind != "f":
         return np.array_equal(a, b)
     return np.array_equal(a, b, equal_nan=True) or bool(np.abs(a - b).max() <= ROUNDING * np.abs(a).max())
-
-
-def _text(spec: mujoco.MjSpec) -> str:
-    """MJCF in full precision, with two things that MuJoCo leaves out.
-
-    These are the numbers of a site's size that its type does not use, for which MJCF has another default, and the `dampratio` of servos,
-    which `<general>` has in its `biasprm` and MuJoCo replaces by the damping.
-    """
-    spec, root = xml_tree(spec)
-    for element in root.iter("site"):
-        if element.get("name"):
-            element.set("size", " ".join(f"{x:.17g}" for x in np.asarray(spec.site(element.get("name")).size)))
-    for actuator, element in zip(spec.actuators, root.iterfind("actuator/*"), strict=True):
-        if specs.has_dampratio(actuator):
-            element.set("biasprm", " ".join(f"{x:.17g}" for x in actuator.biasprm))
-    return ElementTree.tostring(root, encoding="unicode")

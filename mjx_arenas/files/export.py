@@ -12,7 +12,7 @@ import numpy as np
 from mujoco import mjx
 
 from mjx_arenas import __version__
-from mjx_arenas.build import assemble
+from mjx_arenas.build import mjcf
 from mjx_arenas.files.output import whole
 from mjx_arenas.params.params import ArenaParams, named, on_host
 from mjx_arenas.problem import problem
@@ -49,7 +49,7 @@ def export(
         add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])
         model = spec.compile()
     about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}
-    written = assemble.world_xml(spec, record.parts) if format == "xml" else model
+    written = mjcf.proven(spec, "params") if format == "xml" else model
     write(folder, written, dict(spec.assets), params, about)
 
 

@@ -88,6 +88,8 @@ GENERAL = {
     "compiler makes the same one.",
     "nominal_changed": "{at}: what `vary` writes into it would change {names} of the nominal model: give what varies, and what it hangs "
     "on, explicit numbers, in plain elements without rules of the compiler.",
+    "lost_in_mjcf": "{at}: the MJCF that MuJoCo writes of this world would compile to another {names}: "
+    '`arena.export(..., format="mjb")` keeps the compiled model instead.',
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
     "terms_mapping": "{at} must be a dictionary of {of} by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",

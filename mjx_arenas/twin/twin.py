@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from mjx_arenas.build import assemble
+from mjx_arenas.build import assemble, mjcf
 from mjx_arenas.params.params import ArenaParams, canonical, on_host
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.record.record import Record
@@ -35,7 +35,7 @@ def world_spec(record: Record, params: ArenaParams, checked: bool = True) -> tup
 
 def to_xml(record: Record, params: ArenaParams) -> str:
     """MJCF of one world, without what is absent."""
-    return assemble.world_xml(world_spec(record, params)[0], record.parts)
+    return mjcf.proven(world_spec(record, params)[0], "params")
 
 
 def c_world(
