@@ -100,6 +100,7 @@ def of_wall():
     with_terms(arena, x=("body.active", "wall"))
 
 
+MOTOR = '<actuator><dcmotor name="b" joint="b" motorconst="1" resistance="1"/></actuator>'
 HINGE = '<joint name="a" axis="0 1 0"/>'
 DAMPER = '<joint name="a" axis="0 1 0" springdamper=".1 1"/>'
 CASES = {
@@ -127,6 +128,7 @@ CASES = {
         x=("joint.springref", "b"),
     ),
     "fluid": lambda: of_xml(two(geom='fluidshape="ellipsoid"', joint=HINGE), x=("geom.size", "a")),
+    "motor": lambda: of_xml(two(more=MOTOR), x=("actuator.gainprm", "b")),
     "field": lambda: of_xml(FIELD, "jax", x=("geom.size", "a")),
     "object on jax": lambda: test_woken.round_object()[0].put_model("jax"),
     "medium": lambda: test_woken.in_wind("option.density", geom=test_woken.ELLIPSOID)[0].put_model("jax"),

@@ -327,6 +327,7 @@ GENERAL = {
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",
     "unread": "{at}: MuJoCo cannot read {what}: {text}",
     "uncompiled": "{at}: MuJoCo cannot compile it: {text}",
+    "uncompiled_world": "{at}: MuJoCo cannot compile a world in which {quantities} differs from the nominal arena: {text}",
     "unattached": "{at}: MuJoCo cannot attach it: {text}",
     "clash": "{at}: the arena already has {names}: give another `prefix`.",
     # Scores of tasks.

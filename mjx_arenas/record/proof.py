@@ -137,11 +137,15 @@ def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
         raise ValueError(f"MuJoCo cannot compile the arena: {specs.one_line(error)}") from None
 
 
-def _world(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams) -> mujoco.MjModel:
-    """Another world as the compiler makes it, with all tables and objects."""
+def _world(spec: mujoco.MjSpec, parts: Parts, params: ArenaParams, varied: Sequence[str] = ()) -> mujoco.MjModel:
+    """Another world as the compiler makes it, with all tables and objects; `varied` are the quantities that are others than nominally."""
     other = spec.copy()
     assemble.set_params(other, parts, params)
-    return _compiled(other)
+    try:
+        return other.compile()
+    except ValueError as error:
+        told = {"quantities": _listed(varied), "text": specs.one_line(error)}
+        raise validation.error([problem("arena.spec", "uncompiled_world", None, None, told)]) from None
 
 
 def _check_nominal(scene: Scene, nominal: ArenaParams) -> None:
@@ -170,7 +174,7 @@ def _that_something_follows(scene: Scene, spec: mujoco.MjSpec, parts: Parts, nom
         return others
     fields = {field for name in quiet for field in own[name]}
     params = elsewhere(nominal, parts, quiet, 1.0)
-    other, got = _world(spec, parts, params), written(scene, params)
+    other, got = _world(spec, parts, params, quiet), written(scene, params)
     as_written = not any(differ(got, other, name) for name in fields - NOT_IN_MODEL.keys())
     return others if as_written and differing(scene.model, other) - NOT_READ <= fields else others + quiet
 
@@ -195,7 +199,7 @@ def _prove(scene: Scene, spec: mujoco.MjSpec, parts: Parts, params: ArenaParams,
     Raises:
         ValueError: a field differs and is not written, or not rightly.
     """
-    other, got = _world(spec, parts, params), written(scene, params)
+    other, got = _world(spec, parts, params, quantities), written(scene, params)
     varying = differing(scene.model, other) - NOT_READ
     names = set(writer.field_names(scene, frozenset(quantities)))
     wrong = {name for name in (varying | names) - UNDERIVED if differ(got, other, name)}
@@ -269,7 +273,7 @@ def _name(model: mujoco.MjModel, field: str, at: int) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    quoted = [f"`{name}`" for name in names]
+    quoted = [f"`{name}`" for name in names] or ["nothing"]
     return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} and {quoted[-1]}"
 
 
