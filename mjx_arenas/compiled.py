@@ -207,7 +207,7 @@ class Compiled(Shown):
         """MJCF of the nominal arena."""
         spec = self.own_spec()
         self._parts.presence.edit(spec, self._nominal)
-        return mjcf.proven(spec, "arena.spec")
+        return mjcf.proven(spec, specs.compiled(spec.copy(), "arena.spec"), "arena.spec")
 
     @one_at_a_time
     def own_spec(self) -> mujoco.MjSpec:

@@ -17,8 +17,8 @@ import test_scenes
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas.build import mjcf, order
 from mjx_arenas.files import export
-from mjx_arenas.spec import specs
 
 STEPS = 20  # of 2 ms: objects fall 8 mm
 PLAIN = """
@@ -154,7 +154,7 @@ def test_assets_come_along(tmp_path):
     xml = (tmp_path / "elsewhere" / "world.xml").read_text()
     assert str(tmp_path) not in xml
     assert str(test_attach.ROBOTS) not in xml
-    for path, rtol in (("elsewhere/world.xml", 2e-5), ("mjb/world.mjb", 0)):  # MJCF has six digits of what is a robot's
+    for path, rtol in (("elsewhere/world.xml", 1e-12), ("mjb/world.mjb", 0)):
         load = mujoco.MjModel.from_xml_path if rtol else mujoco.MjModel.from_binary_path
         got = load(str(tmp_path / path))
         assert (got.nmesh, got.ntex, got.nu, got.nkey) == (model.nmesh, model.ntex, model.nu, model.nkey + 1)
@@ -246,18 +246,89 @@ def test_lost_in_mjcf(tmp_path):
     assert not exported.actuator_lengthrange.any()
 
 
-@pytest.mark.parametrize("lost", ["a friction of 0.3 % less", "an option"])
-def test_any_loss_is_noticed(monkeypatch, lost):
-    """A writer that changes a number by 0.3 %, or an option."""
-    arena, as_written = mja.TableArena(objects=[mja.Object("cube")]), specs.to_xml
+RICH = """<mujoco><worldbody><body name="a"><freejoint name="f"/><geom name="g" size="0.1"/></body><body name="m" mocap="true"/>
+  </worldbody><equality><weld name="w" body1="a" body2="m"/></equality><keyframe><key name="k" qpos="0 0 1 1 0 0 0"/></keyframe>
+  <custom><text name="t" data="one"/></custom></mujoco>"""
+
+
+def lose(spec, what):
+    if what == "geom_friction":
+        spec.geom("g").friction[0] *= 0.997
+    elif what == "opt.iterations":
+        spec.option.iterations += 1
+    elif what == "key_qpos":
+        spec.key("k").qpos = np.array(spec.key("k").qpos) * [1, 1, 0.997, 1, 1, 1, 1]
+    elif what == "key_mpos":
+        spec.key("k").mpos = np.array([0, 0, 0.003])
+    elif what == "eq_active0":
+        spec.equality("w").active = False
+    elif what == "vis.global.offwidth":
+        spec.visual.global_.offwidth += 1
+    elif what == "text_data":
+        spec.text("t").data = "two"
+    elif what == "nuserdata":
+        spec.nuserdata = 3
+
+
+LOST = (
+    "geom_friction",
+    "opt.iterations",
+    "key_qpos",
+    "key_mpos",
+    "eq_active0",
+    "vis.global.offwidth",
+    "text_data",
+    "nuserdata",
+)
+
+
+@pytest.mark.parametrize("at", ["in frames", "written"])
+@pytest.mark.parametrize("what", LOST)
+def test_any_loss_is_noticed(monkeypatch, what, at):
+    """Of a number by 0.3 %, of an option, of what no step reads: whether it is lost by the writer or before."""
+    module, name = (mjcf, "in_full") if at == "written" else (order, "put_frames_in_order")
+    as_it_is = getattr(module, name)
 
     def losing(spec):
-        if lost == "an option":
-            spec.option.iterations += 1
-        else:
-            spec.body("cube").first_geom().friction[0] *= 0.997
-        return as_written(spec)
+        lose(spec, what)
+        if at == "written":
+            spec.compile()
+        return as_it_is(spec)
 
-    monkeypatch.setattr(specs, "to_xml", losing)
-    with pytest.raises(ValueError, match="another " + ("opt.iterations" if lost == "an option" else "geom_friction")):
+    monkeypatch.setattr(module, name, losing)
+    arena = mja.Arena.from_xml(RICH)
+    with pytest.raises(ValueError, match=f"another .*{what}"):
         arena.to_xml(arena.nominal_params())
+
+
+BODY = '<body name="a" pos="0 0 1">{}</body>'
+KEPT = {
+    "a size of three numbers": BODY.format('<geom size=".1 .1 .1"/>'),
+    "an unnamed site of three": BODY.format('<geom size=".1"/><site size=".1 .2 .3"/>'),
+    "an aligned body": BODY.format(
+        '<freejoint align="true"/><geom type="box" size=".1 .2 .3" pos=".1 0 0" euler="10 20 30"/><geom size=".1"/>'
+    ),
+    "a text of XML": "</worldbody><custom><text name='t' data=\"don't &lt; &amp;\"/></custom><worldbody>",
+}
+
+
+@pytest.mark.parametrize("what", KEPT)
+def test_what_is_kept(what):
+    """Numbers that nothing uses, and rounding, are no other world; texts and names come back."""
+    arena = mja.Arena.from_xml(f"<mujoco><worldbody>{KEPT[what]}</worldbody></mujoco>")
+    written = mujoco.MjModel.from_xml_string(arena.to_xml(arena.nominal_params()))
+    made = arena.compile(arena.nominal_params())
+    assert (written.names, written.text_data) == (made.names, made.text_data)
+    for name in ("body_mass", "body_inertia", "body_pos", "geom_rbound"):
+        np.testing.assert_allclose(getattr(written, name), getattr(made, name), rtol=1e-9, atol=1e-12)
+
+
+def test_bundles_of_what_mjcf_loses(tmp_path):
+    """A world that MJCF would lose is in its bundle as a compiled model, and is replayed from it."""
+    arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], xml=MUSCLE, objects=[mja.Object("cube")])
+    ranges = mja.ArenaRanges(workspace=mja.Workspace((0, 0), (0.9, 0.9)))  # without the second table
+    report = mja.check(arena, ranges, 1, n_steps=2, engine="c")
+    report.save_bundle(tmp_path / "bundle", 0)
+    assert {"world.mjb"} == {one.name for one in (tmp_path / "bundle").iterdir() if one.name.startswith("world")}
+    assert set(report.failures) == {"invalid_arena"}
+    assert mja.replay(tmp_path / "bundle").found == report.of(0)

@@ -172,9 +172,9 @@ def edited():
 
 
 def unheld():
-    """A site without a name, of whose size MJCF says less than the spec."""
+    """A name that XML does not give back."""
     arena = mja.TableArena()
-    arena.spec.worldbody.add_site(size=[0.01, 0, 0])
+    arena.spec.worldbody.add_site(name="two\nlines", size=[0.01, 0, 0])
     return arena
 
 

@@ -16,11 +16,11 @@ from test_plan import names_apart
 
 import mjx_arenas as mja
 from mjx_arenas import cli, furniture, geometry
+from mjx_arenas.build import mjcf
 from mjx_arenas.furniture import standing
 from mjx_arenas.params.params import on_host
 from mjx_arenas.pixels import labels
 from mjx_arenas.record.elsewhere import elsewhere
-from mjx_arenas.spec import specs
 from mjx_arenas.viz import describe, plan, plots, render, samples
 
 U = mja.Uniform
@@ -458,8 +458,7 @@ def test_furniture_on_furniture(tmp_path):
 
 
 def test_mjcf_has_all_digits(monkeypatch):
-    """Of furniture, and of what follows a table of a scene, where MuJoCo itself writes six digits."""
-    monkeypatch.setattr(specs, "_library", lambda: None)
+    """Of furniture, and of what follows a table of a scene; a MuJoCo that writes six is refused."""
     scene = """<mujoco><worldbody><body name="desk" pos="0 0 .7"><geom name="slab" type="box" size=".5 .4 .02"/>
       <geom name="side" type="box" size=".02 .4 .34" pos=".48 0 -.36"/></body></worldbody></mujoco>"""
     arena = mja.Arena.from_xml(scene, ["slab"], follow=[mja.Follow("side", x="+", z="floor")])
@@ -489,4 +488,7 @@ def test_mjcf_has_all_digits(monkeypatch):
         "dof_damping",
     ):
         got, want = getattr(again, field), getattr(compiled, field)
-        assert np.abs(got - want).max() < 1e-8, field  # nine digits of numbers up to 10
+        assert np.abs(got - want).max() < 1e-14, field  # a rounding or two of numbers up to 10
+    monkeypatch.setattr(mjcf, "_library", lambda: None)
+    with pytest.raises(RuntimeError, match="cannot write MJCF in full precision"):
+        arena.to_xml(params)

@@ -146,7 +146,7 @@ def test_every_rule_has_a_sentence():
     for rule, text in SENTENCES.items():
         assert all(field is None or field.isidentifier() for _, field, _, _ in string.Formatter().parse(text)), rule
         assert (
-            rule in ("said", "unread", "uncompiled", "uncompiled_world", "unattached")
+            rule in ("said", "unread", "uncompiled", "uncompiled_world", "unattached", "unread_mjcf")
             or text[-1] in ".?"
             or text.endswith("{nearest}")
         ), rule

@@ -2,6 +2,7 @@
 
 import re
 
+import jax
 import mujoco
 import numpy as np
 import pytest
@@ -63,9 +64,12 @@ def test_bodies_without_mass(kind):
 
 
 INERTIAL = '<body name="it"><inertial mass="0" pos="0 0 0" diaginertia="0 0 0"/></body>'
+FRAME = '<frame pos="0 0 .2">{}</frame>'
 UNCLEAR = {
     "`arena.spec` must have no <inertial> without mass where its body is, got that of body 'it': leave it out, and the": INERTIAL,
-    "cannot vary, as it has no mass and is in a <frame>: take it out": f'<frame pos="0 0 .2">{BARE.format("")}</frame>',
+    "cannot vary, as it has no mass and is in a <frame>, which `attach` makes of a pose: take": FRAME.format(
+        BARE.format("")
+    ),
 }
 
 
@@ -105,6 +109,53 @@ ORDERS = {
         + '<geom pos=".2 0 0" size=".1"/></body>',
     ),
 }
+
+
+TWO_IN_A_FRAME = FRAMED.format(BODY.format("a", 0) + BODY.format("b", 1))
+
+
+@pytest.mark.parametrize("rules", ['angle="radian"', 'angle="degree"', 'angle="radian" eulerseq="zyx"'])
+@pytest.mark.parametrize("turn", ['euler="0.3 1.2 0.5"', 'axisangle="0 1 1 1.2"', 'zaxis="0 1 2"'])
+@pytest.mark.parametrize("own", ["radian", "degree"])
+def test_frames_of_other_rules(own, turn, rules):
+    """A frame of an attached MJCF has the angles of its own <compiler>, also where a world's MJCF gives it anew."""
+    robot = f"<mujoco><compiler {rules}/><worldbody>{TWO_IN_A_FRAME}</worldbody></mujoco>"
+    arena = mja.Arena.from_xml(f'<mujoco><compiler angle="{own}"/><worldbody/></mujoco>')
+    arena.attach(robot.replace('axisangle="0 0 1 20"', turn), "r_", pos=(0, 0, 1))
+    arena.vary(q=dr.Term("body.pos", "r_a"))
+    params = arena.nominal_params()
+    alone = mujoco.MjModel.from_xml_string(robot.replace('axisangle="0 0 1 20"', turn))
+    written = mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    for model, up in ((arena.compile(params), (0, 0, 1)), (written, (0, 0, 1))):
+        np.testing.assert_allclose(model.body("r_b").pos, alone.body("b").pos + up, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(model.body("r_b").quat, alone.body("b").quat, rtol=0, atol=1e-12)
+
+
+def test_what_is_between_two_of_a_frame():
+    """MuJoCo writes what is in a frame at once: a body that was added in between would come after it."""
+    spec = mujoco.MjSpec()
+    frame = spec.worldbody.add_frame(pos=(0, 0, 1))
+    for name, within in (("a", frame), ("between", None), ("b", frame)):
+        body = spec.worldbody.add_body(name=name, pos=(ord(name[0]), 0, 1))
+        if within is not None:
+            body.set_frame(within)
+        body.add_joint(name=f"j{name}", axis=(0, 1, 0))
+        body.add_geom(size=(0.1, 0, 0))
+    arena = mja.Arena.from_xml(spec)
+    written = mujoco.MjModel.from_xml_string(arena.to_xml(arena.nominal_params()))
+    assert [written.joint(i).name for i in range(3)] == ["ja", "jbetween", "jb"]
+
+
+def test_attached_without_mass():
+    """The frame in which `attach` puts what has no pose changes nothing, and so does not keep a body without mass from moving."""
+    arena = mja.TableArena()
+    arena.attach('<mujoco><worldbody><body name="it" mocap="true" pos="1 0 1"/></worldbody></mujoco>', "r_")
+    arena.vary(pos=dr.Term("body.pos", "r_it"))
+    ranges = mja.ArenaRanges(terms={"pos": mja.Uniform(0.1, 0.2, relative="add")})
+    world = arena.sample_params(jax.random.key(0), ranges)
+    got = arena.compile(world).body("r_it")
+    np.testing.assert_array_equal(got.ipos, got.pos)
+    assert (got.pos - [1, 0, 1] > 0.09).all()
 
 
 @pytest.mark.parametrize("case", ORDERS)

@@ -283,6 +283,36 @@ def test_rules():
     assert report.before == report.after
 
 
+PAD = """<mujoco><compiler inertiagrouprange="{0}"/><asset><mesh name="m" vertex="-.1 -.1 -.1 .2 0 0 0 .1 0 0 0 .3"/></asset>
+  <worldbody><body name="arm"><joint axis="0 1 0"/><geom type="box" size=".1 .1 .1" group="{1}" contype="0" conaffinity="0"/>
+  <body name="pad" pos="0 0 .5"><geom name="pad" type="mesh" mesh="m" group="{2}" {3}/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("groups", "own", "visual"), [("0 2", 3, False), ("3 5", 0, True)])
+def test_bodies_without_mass_stay_so(groups, own, visual):
+    """Also where the geom that collides comes into another group, of which the compiler would make an inertial."""
+    text = PAD.format(groups, groups[0], own, "")
+    before = mujoco.MjModel.from_xml_string(text)
+    assert before.body("pad").mass == 0
+    after = mja.simplify(text, visual=visual)[0].compile()
+    np.testing.assert_array_equal(after.body_mass, before.body_mass)
+
+
+@pytest.mark.parametrize(
+    "turn", ['euler="90 0 30"', 'axisangle="0 1 1 50"', 'xyaxes="0 1 0 0 0 1"', 'zaxis="1 2 0"', 'quat="1 2 0 0"']
+)
+def test_what_is_drawn_stands_where_it_stood(turn):
+    """However the MJCF says how a mesh is turned."""
+    text = PAD.format("0 5", 0, 0, f'pos=".1 0 .2" {turn}')
+    before, after = mujoco.MjModel.from_xml_string(text), mja.simplify(text, collision="box")[0].compile()
+    poses = []
+    for model, name in ((before, "pad"), (after, "pad_visual")):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        poses.append(np.concatenate([data.geom(name).xpos, data.geom(name).xmat]))
+    np.testing.assert_allclose(*poses, rtol=0, atol=1e-9)
+
+
 def test_what_is_drawn():
     """A mesh that was seen is drawn on, and the shape that collides is not; without `visual` only what is referred to stays."""
     before, (spec, report) = original(), arm(collision="capsule", keep=TIPS)

@@ -5,6 +5,7 @@ from typing import Any
 
 import mujoco
 
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import KINDS
 
 _OF_BODIES = tuple(
@@ -37,13 +38,16 @@ def _path(body: Any, element: Any) -> tuple[int, ...]:
 
 
 def _sorted(paths: Sequence[tuple[int, ...]]) -> bool:
-    """Whether frames come in the order in which they were added; what is in no frame is written where it is."""
+    """Whether frames come in the order in which they were added, each with all that is in it at once; the rest is written where it is."""
     last: dict[tuple[int, ...], int] = {}
+    before: tuple[int, ...] = ()
     for path in paths:
         for depth, index in enumerate(path):
-            if index < last.get(path[:depth], -1):
+            latest = last.get(path[:depth], -1)
+            if index < latest or (index == latest and path[: depth + 1] != before[: depth + 1]):
                 return False
             last[path[:depth]] = index
+        before = path
     return True
 
 
@@ -53,9 +57,8 @@ def _reframe(body: Any, element: Any) -> None:
     for frame in _frames(element) or [None]:
         new = body.add_frame() if new is None else body.add_frame(new)
         if frame is not None:
-            for name in ("pos", "quat", "scale", "scaling", "massscale"):
-                if hasattr(frame, name):  # MuJoCo 3 has no scales
+            new.pos, new.quat = frame.pos, specs.turn(frame)
+            for name in ("scale", "scaling", "massscale"):
+                if hasattr(frame, name):  # MuJoCo 3 has none
                     setattr(new, name, getattr(frame, name))
-            for name in ("type", "axisangle", "xyaxes", "zaxis", "euler"):
-                setattr(new.alt, name, getattr(frame.alt, name))
     element.set_frame(new)

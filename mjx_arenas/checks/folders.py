@@ -63,11 +63,20 @@ def write(folder: str | os.PathLike, record: Record, ranges: ArenaRanges, run: R
         states |= {f"{of}_{name}": x for name, x in (state or {}).items()}
     names = {"tables": record.table_names, "objects": list(record.object_names)}
     noted = {"seed": about["seed"], "world": about["world"], **names}
-    xml = None if spec is None else mjcf.text(spec)
+    world = None if spec is None else _as_written(spec)
     with whole(folder, over=is_bundle) as unfinished:
-        export.write(unfinished, xml, dict(record.spec.assets), run.params, noted)
+        export.write(unfinished, world, dict(record.spec.assets), run.params, noted)
         np.savez_compressed(unfinished / "states.npz", **states)
         (unfinished / "failure.json").write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+
+
+def _as_written(spec: mujoco.MjSpec) -> str | mujoco.MjModel:
+    """A world as MJCF; compiled, where MJCF would lose something of it."""
+    model = spec.compile()
+    try:
+        return mjcf.proven(spec, model, "params")
+    except ValueError:
+        return model
 
 
 def _world(record: Record, run: Run) -> tuple[mujoco.MjSpec, mujoco.MjData] | tuple[None, None]:
@@ -145,7 +154,7 @@ class Bundle:
             if not np.isin(params.object_tables, range(most + 1)).all():
                 raise messages.error([problem("object_tables", "table_number", None, params.object_tables, most=most)])
             there = tops.present(params, ground)[1]
-        model = _model(folder / "world.xml", [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
+        model = _model(folder, [objects[k] for k in np.flatnonzero(there)]) if about["compiles"] else None
         file = folder / "states.npz"
         with _reading(file), file.open("rb") as opened, np.load(opened) as arrays:
             qpos = kept_rules.shaped("objects", arrays["objects"], (len(objects), 7))
@@ -237,11 +246,13 @@ def _failure(data: dict[str, Any]) -> Failure:
     return Failure(int(data["world"]), data["step"], float(data["number"]), str(data["what"]))
 
 
-def _model(file: pathlib.Path, objects: Sequence[str]) -> mujoco.MjModel:
+def _model(folder: pathlib.Path, objects: Sequence[str]) -> mujoco.MjModel:
     """The model of a world in which these objects are there."""
+    compiled = (folder / "world.mjb").is_file()
+    file = folder / ("world.mjb" if compiled else "world.xml")
     with _reading(file):
         try:
-            model = mujoco.MjModel.from_xml_path(str(file))
+            model = (mujoco.MjModel.from_binary_path if compiled else mujoco.MjModel.from_xml_path)(str(file))
         except ValueError as error:
             raise ValueError(f"MuJoCo cannot read it: {specs.one_line(error)}") from None
         free = {model.body(b).name for b in model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]}

@@ -5,18 +5,14 @@ import tempfile
 from collections.abc import Mapping
 
 import mujoco
-import numpy as np
 
 from mjx_arenas.arena import Arena
 from mjx_arenas.build import mjcf
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
 from mjx_arenas.spec import specs
-from mjx_arenas.spec.comparing import STATISTICS
 
 NAME = "spec.xml"
-_OF_HULLS = ("mesh_graph", "mesh_poly", "mesh_extrema")  # which a spec keeps of meshes that collide no more
-ROUNDING = 1e-12  # of an array's largest number: masses are summed from other shapes' digits again
 
 
 def path_beside(file: pathlib.Path) -> pathlib.Path:
@@ -41,7 +37,7 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         fill(pathlib.Path(folder), files)
         again.spec = specs.read(pathlib.Path(folder, NAME), "spec")
-        if not same(again.mj_model, arena.mj_model):
+        if mjcf.lost(arena.mj_model, again.mj_model):
             return False
     put(path_beside(file).parent, files)
     return True
@@ -64,19 +60,3 @@ def put(folder: pathlib.Path, files: Mapping[str, bytes]) -> None:
     with whole(folder, over=lambda there: (there / NAME).is_file()) as unfinished:
         unfinished.mkdir()
         fill(unfinished, files)
-
-
-def same(one: mujoco.MjModel, other: mujoco.MjModel) -> bool:
-    """Whether two models are equal to rounding in double precision, but for where their files are."""
-    if one.names != other.names or specs.options(one.opt) != specs.options(other.opt):
-        return False
-    names = [n for n in dir(one) if not n.startswith(("_", *_OF_HULLS)) and "path" not in n]
-    pairs = [(getattr(one, name), getattr(other, name)) for name in names]
-    pairs += [(np.asarray(getattr(one.stat, name)), np.asarray(getattr(other.stat, name))) for name in STATISTICS]
-    return all(_close(a, b) for a, b in pairs if isinstance(a, np.ndarray))
-
-
-def _close(a: np.ndarray, b: np.ndarray) -> bool:
-    if a.shape != b.shape or a.dtype.kind != "f":
-        return np.array_equal(a, b)
-    return np.array_equal(a, b, equal_nan=True) or bool(np.abs(a - b).max() <= ROUNDING * np.abs(a).max())

@@ -49,7 +49,7 @@ def export(
         add_state(spec, twin.c_world(record, params, data, keyframe=keyframe)[1])
         model = spec.compile()
     about = {**noted, "tables": record.table_names, "objects": [*record.object_names]}
-    written = mjcf.proven(spec, "params") if format == "xml" else model
+    written = mjcf.proven(spec, model, "params") if format == "xml" else model
     write(folder, written, dict(spec.assets), params, about)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 
 from mjx_arenas.arena import Arena
+from mjx_arenas.build import mjcf
 from mjx_arenas.dr import Term
 from mjx_arenas.files import edited
 from mjx_arenas.files.numbered import named
@@ -172,7 +173,7 @@ def _complete(data: dict[str, Any], arena: Arena, file: pathlib.Path, there: Map
     if options := specs.other_options(own.option, again.spec.option):
         data["options"] = options
         specs.assign(again.spec.option, **options)
-    if _xml(again.own_spec()) == _xml(own) or (there and edited.same(again.mj_model, arena.mj_model)):
+    if _xml(again.own_spec()) == _xml(own) or (there and not mjcf.lost(arena.mj_model, again.mj_model)):
         return
     data.pop("options", None)  # it was edited, or a file has changed since
     data["spec"] = edited.path_beside(file).relative_to(file.parent).as_posix()

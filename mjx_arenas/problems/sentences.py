@@ -90,6 +90,8 @@ GENERAL = {
     "on, explicit numbers, in plain elements without rules of the compiler.",
     "lost_in_mjcf": "{at}: the MJCF that MuJoCo writes of this world would compile to another {names}: "
     '`arena.export(..., format="mjb")` keeps the compiled model instead.',
+    "unread_mjcf": "{at}: the MJCF that MuJoCo writes of this world cannot be read again: {text}",
+    "six_digits": "This MuJoCo cannot write MJCF in full precision: use the one of the package `mujoco`.",
     "term_taken": "{at} is taken, as {owner}: give the term another name, such as `{free}`.",
     "terms_mapping": "{at} must be a dictionary of {of} by the names of quantities, got {got}.",
     "no_body": "{at} must be {must}: no body is called {got}{nearest}",

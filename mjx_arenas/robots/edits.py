@@ -119,8 +119,11 @@ def _referred(spec: mujoco.MjSpec) -> set[str]:
 def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collection[int]) -> None:
     """Gives the bodies of geoms that change the inertials that the compiler made of their geoms."""
     bodies = set(model.geom_bodyid[sorted(geoms)].tolist()) - {0}
-    bodies &= set(np.flatnonzero(model.body_mass).tolist())  # of the others the compiler makes the same as before
     inferred = [body for body in spec.bodies if body.id in bodies and masses.inferred(body)]
+    for body in [body for body in inferred if not model.body_mass[body.id]]:
+        inferred.remove(body)  # the compiler makes the same as before, if nothing on it weighs in another group either
+        for geom in body.geoms:
+            geom.mass = 0
     for body in inferred:
         own = {
             "mass": model.body_mass,

@@ -1,10 +1,7 @@
 """Reading, editing and merging `mujoco.MjSpec`s (host)."""
 
-import contextlib
-import ctypes
 import functools
 import os
-import pathlib
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -173,13 +170,24 @@ def move_geom(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, body: mujoco.MjsBody) -
     return moved
 
 
+def turn(element: Any) -> np.ndarray:
+    """(4,) the quaternion of an element in its frame; angles are in the units and the order of the MJCF that it comes from."""
+    if element.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        return np.array(element.quat)
+    rules = element.compiler
+    resolve = mujoco.MjSpec.resolve_orientation
+    return np.array(resolve(degree=rules.degree, sequence=rules.eulerseq, orientation=element.alt))
+
+
 def copy_geom(geom: mujoco.MjsGeom, body: mujoco.MjsBody, name: str) -> mujoco.MjsGeom:
     """A geom like another one, in none of its frames."""
     copied = body.add_geom(name=name)
+    copied.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     for attribute in dir(geom):
         value = None if attribute.startswith("_") or attribute in _NOT_COPIED else getattr(geom, attribute)
         if value is not None and not callable(value):
             setattr(copied, attribute, value)
+    copied.quat = turn(geom)
     return copied
 
 
@@ -361,28 +369,3 @@ def has_dampratio(actuator: mujoco.MjsActuator) -> bool:
     fixed, affine = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     servo = actuator.gaintype == fixed and actuator.biastype == affine and actuator.gainprm[0] == -actuator.biasprm[1]
     return bool(servo and actuator.biasprm[2] > 0)
-
-
-def to_xml(spec: mujoco.MjSpec) -> str:
-    """MJCF of a compiled spec, in full precision where this MuJoCo can say how many digits it writes, else with six."""
-    library = _library()
-    if library is None:
-        return spec.to_xml()
-    before = library._mjPRIVATE__get_xml_precision()
-    library._mjPRIVATE__set_xml_precision(17)
-    try:
-        return spec.to_xml()
-    finally:
-        library._mjPRIVATE__set_xml_precision(before)
-
-
-@functools.cache
-def _library() -> ctypes.CDLL | None:
-    """MuJoCo's library, as it is loaded; None where it does not say how many digits it writes, which is no public function."""
-    folder = pathlib.Path(mujoco.__file__).parent
-    for path in sorted((*folder.glob("libmujoco*"), *folder.glob("mujoco.dll"))):
-        with contextlib.suppress(OSError):
-            library = ctypes.CDLL(str(path))
-            if hasattr(library, "_mjPRIVATE__set_xml_precision"):
-                return library
-    return None

@@ -35,7 +35,7 @@ def world_spec(record: Record, params: ArenaParams, checked: bool = True) -> tup
 
 def to_xml(record: Record, params: ArenaParams) -> str:
     """MJCF of one world, without what is absent."""
-    return mjcf.proven(world_spec(record, params)[0], "params")
+    return mjcf.proven(*world_spec(record, params), "params")
 
 
 def c_world(

@@ -146,7 +146,7 @@ class Shown:
         """Many worlds side by side in one model of C MuJoCo, as its viewer takes it; its names have prefixes "world0_", ...
 
         Level planes of the world (floors) are there only once, for all worlds. Keyframes are left out. Worlds do not touch
-        each other as long as nothing leaves its own world by more than 0.5 m. A robot's numbers have six digits.
+        each other as long as nothing leaves its own world by more than 0.5 m.
 
         Args:
             params: (W, ...) of all worlds.
@@ -203,7 +203,7 @@ class Shown:
 
         The folder gets `world.xml` with its meshes and textures under `assets`, or `world.mjb`, which contains everything but only
         works with this version of MuJoCo. It also gets `params.json` with the parameters, the names of tables and objects, and versions.
-        In the MJCF the numbers of tables, objects and keyframes have all digits; others have six.
+        The MJCF is in full precision, and compiles to the same model.
 
         Args:
             params: parameters of one world.

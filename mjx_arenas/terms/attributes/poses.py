@@ -154,9 +154,17 @@ def _inertial(spec: mujoco.MjSpec, element: Any) -> str:
 
     The compiler gives one without an inertial another, whose pose is in numbers that of the body, in the body's <frame>.
     """
-    if not element.explicitinertial and element.frame is not None and not any(map(weighs, element.geoms)):
-        return "it has no mass and is in a <frame>: take it out of this, or give it a mass"
-    return ""
+    if element.explicitinertial or any(map(weighs, element.geoms)) or not _moved(element.frame):
+        return ""
+    return "it has no mass and is in a <frame>, which `attach` makes of a pose: take it out of this, or give it a mass"
+
+
+def _moved(frame: Any) -> bool:
+    """Whether a frame, or one in which it is, has a pose."""
+    if frame is None:
+        return False
+    turned = frame.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT or np.any(frame.quat != [1, 0, 0, 0])
+    return bool(turned or np.any(frame.pos)) or _moved(frame.frame)
 
 
 def _edge(model: mujoco.MjModel, index: int) -> str:
