@@ -332,3 +332,17 @@ def test_bundles_of_what_mjcf_loses(tmp_path):
     assert {"world.mjb"} == {one.name for one in (tmp_path / "bundle").iterdir() if one.name.startswith("world")}
     assert set(report.failures) == {"invalid_arena"}
     assert mja.replay(tmp_path / "bundle").found == report.of(0)
+
+
+TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+
+
+def test_assets_in_memory_under_a_folder(tmp_path):
+    """MuJoCo looks for them in the compiler's `meshdir`, as for files."""
+    text = """<mujoco><compiler meshdir="meshes"/><asset><mesh name="m" file="m.obj"/></asset>
+      <worldbody><body pos="0 0 1"><freejoint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    spec = mujoco.MjSpec.from_string(text, assets={"meshes/m.obj": TETRAHEDRON})
+    arena = mja.Arena.from_xml(spec)
+    arena.export(arena.nominal_params(), tmp_path / "world")
+    written = mujoco.MjModel.from_xml_path(str(tmp_path / "world" / "world.xml"))
+    np.testing.assert_array_equal(written.mesh_vert, arena.mj_model.mesh_vert)

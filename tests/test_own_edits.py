@@ -90,6 +90,38 @@ def test_inertials_of_aligned_bodies(attribute):
         arena.vary(it=dr.Term(attribute, "it"))
 
 
+ADDED = {
+    "a geom is added": ("body.mass", lambda spec: spec.body("it").add_geom(size=(0.1, 0, 0), pos=(0, 0, 0.3), mass=5)),
+    "a density": ("body.ipos", lambda spec: setattr(spec.geom("box"), "density", 1003)),
+    "a size": ("body.payload", lambda spec: setattr(spec.geom("box"), "size", (0.1, 0.05, 0.02006))),
+    "a place": ("body.inertia", lambda spec: setattr(spec.geom("box"), "pos", (0, 0, 0.001))),
+    "the size of a geom": ("geom.mass", lambda spec: setattr(spec.geom("box"), "size", (0.1, 0.05, 0.02006))),
+}
+
+
+@pytest.mark.parametrize("case", ADDED)
+def test_geoms_edited_after_vary(case):
+    """A body keeps the inertial that a term has read, and so no geom of which it was made may become another one by 0.3 %."""
+    attribute, edit = ADDED[case]
+    box = '<body name="it"><joint axis="0 1 0"/><geom name="box" type="box" size=".1 .05 .02"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=box))
+    arena.vary(it=dr.Term(attribute, "box" if attribute == "geom.mass" else "it"))
+    edit(arena.spec)
+    of = "geom 'box' weighs" if attribute == "geom.mass" else "the geoms of body 'it' weigh"
+    with pytest.raises(ValueError, match=f"what {of} was edited after `arena.vary\\(it=...\\)` had read it"):
+        arena.mj_model  # noqa: B018
+
+
+@pytest.mark.parametrize("attribute", ["body.mass", "geom.mass", "geom.density"])
+def test_geoms_that_weigh_nothing_after_vary(attribute):
+    """They may come, and so may what has an inertial of its own."""
+    box = '<body name="it"><joint axis="0 1 0"/><geom name="box" type="box" size=".1 .05 .02"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=box))
+    arena.vary(it=dr.Term(attribute, "it" if attribute == "body.mass" else "box"))
+    arena.spec.body("it").add_geom(size=(0.1, 0, 0), pos=(0, 0, 0.3), mass=0)
+    assert arena.mj_model.body("it").mass == pytest.approx(0.8, rel=1e-12)
+
+
 KEYED = '<keyframe><key name="k" qpos="{}"/></keyframe>'
 FRAMED = '<frame pos="0 0 1" axisangle="0 0 1 20">{}</frame>'
 JOINTS = '<joint name="{0}" axis="0 {1} {2}" pos=".1 0 0"/>'

@@ -168,6 +168,16 @@ def test_what_is_said_of_the_rest():
         assert f"{field} of … would be stale" in rows
 
 
+@pytest.mark.filterwarnings("ignore:.*settotalmass")
+def test_rules_of_masses_are_named():
+    """Where numbers that `vary` writes would change all masses, the rule by which they would is named."""
+    arena = mja.Arena.from_xml(two(compiler='settotalmass="7"'))
+    with pytest.raises(
+        ValueError, match=r"`spec.compiler`: settotalmass would make the masses of all bodies follow from `x`"
+    ):
+        arena.vary(x=dr.Term("geom.mass", "b"))
+
+
 @pytest.mark.parametrize(("attribute", "kind"), [("body.ipos", "body"), ("geom.pos", "geom"), ("geom.rpy", "geom")])
 def test_objects_of_one_geom_keep_it_in_the_middle(attribute, kind):
     """A term of all elements leaves them out, and one that names them is refused; what hangs beside them varies."""

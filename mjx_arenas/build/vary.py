@@ -62,6 +62,7 @@ def vary(
     chosen = _selected(spec, model, parts, nominal, terms)
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
+    made_of_geoms = {name: inertials.made_of_geoms(spec, term.attribute, chosen[name]) for name, term in terms.items()}
     base = _prepared(spec, model, terms, chosen)
     made = tuple(
         Elements(
@@ -71,6 +72,7 @@ def vary(
             _mask(term, chosen[name], base),
             base,
             _nominal(term, chosen[name], spec, base),
+            made_of_geoms[name],
         )
         for name, term in terms.items()
     )
@@ -102,6 +104,9 @@ def _prepared(
     base = specs.compiled(spec.copy(), "arena.spec")
     edited = comparing.differing(model, base) - comparing.NOT_READ - _SHORT_CUTS
     edited = [name for name in sorted(edited) if not name.startswith("name")]
+    if edited and (rules := [rule for rule in masses.mass_rules(spec) if rule in (*masses.BOUNDS, "settotalmass")]):
+        told = {"names": rules, "varied": next(iter(terms))}
+        raise validation.error([problem("spec.compiler", "compiler_weighs_all", None, None, told)])
     if edited:
         raise validation.error([problem("arena.spec", "nominal_changed", None, None, names=edited)])
     return base

@@ -97,9 +97,11 @@ def with_copies(xml: str, assets: dict[str, bytes], name: str = "world.xml") -> 
         OSError: one sentence, if a file cannot be read.
     """
     root = ElementTree.fromstring(xml)
+    folders = [""]  # in which MuJoCo looks for assets
     for compiler in root.iter("compiler"):
-        for attribute in ("meshdir", "texturedir", "assetdir"):
-            compiler.attrib.pop(attribute, None)
+        folders += [
+            compiler.attrib.pop(name) for name in ("meshdir", "texturedir", "assetdir") if name in compiler.attrib
+        ]
     copies: dict[str, str] = {}
     contents: dict[str, bytes] = {}
     for element in root.iter():  # skins stand outside <asset>
@@ -107,7 +109,8 @@ def with_copies(xml: str, assets: dict[str, bytes], name: str = "world.xml") -> 
             source = element.attrib[attribute]
             if source not in copies:
                 copies[source] = _free_name(os.path.basename(source), copies.values())
-                contents[copies[source]] = assets[source] if source in assets else _read(source)
+                held = next((path for f in folders if (path := os.path.join(f, source)) in assets), None)
+                contents[copies[source]] = _read(source) if held is None else assets[held]
             element.set(attribute, copies[source])
     ElementTree.indent(root)
     return {name: (ElementTree.tostring(root, encoding="unicode") + "\n").encode(), **contents}

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas.build import assemble
+from mjx_arenas.build.inertials import check_geoms
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.primitives import PRIMITIVES, around
@@ -74,6 +75,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
     refusals.check_files(spec, parts, elsewhere(nominal, parts, quantities, 1.0))
     shaped = _shaped_geoms(parts)
     whole, solids = model, weighed.of(spec, shaped)
+    own = spec
     spec = boxed(spec, model, [*shaped, *(g.name for o in parts.objects for g in spec.body(o.name).find_all("geom"))])
     model = _compiled(spec.copy())
     edited = differing(model, _world(spec, parts, nominal)) - NOT_READ
@@ -82,6 +84,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         told = {"names": sorted(edited), "maker": maker}
         told |= {"part": ", part", "of_part": ", of the part"} if parts.furniture else {"part": "", "of_part": ""}
         raise validation.error([problem("arena.spec", "decided", None, None, told)])
+    check_geoms(own, parts.varied)
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     placed, led, turned = (
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")
