@@ -77,4 +77,4 @@ def test_total_mass_is_lost():
     """MuJoCo leaves out this one rule of a robot's compiler, which a warning says."""
     with pytest.warns() as told:
         with_robot('settotalmass="7"')
-    assert any("settotalmass=7.0 (of the compiler)" in str(one.message) for one in told)
+    assert any("settotalmass=7 of its compiler (arena: none)" in str(one.message) for one in told)

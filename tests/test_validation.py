@@ -238,6 +238,11 @@ ATTACHED = [
     ({"prefix": None}, "prefix", "text"),
     ({"on": 7}, "on", "carrier"),
     ({"robot": FREE, "on": 0}, "on", "free_joint"),
+    (
+        {"robot": BODY.format("", '<geom size=".1"/>').replace("<body", '<body mocap="true"'), "on": 0},
+        "on",
+        "mocap_body",
+    ),
     ({"pos": (0, 0)}, "pos", "vector"),
     ({"pos": (0, 0, 1e30)}, "pos", "limits"),
     ({"quat": (0, 0, 0, 0)}, "quat", "not_zero"),

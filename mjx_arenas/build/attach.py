@@ -60,6 +60,9 @@ def check(
     free = [b.name for b in child.worldbody.bodies if any(j.type == mujoco.mjtJoint.mjJNT_FREE for j in b.joints)]
     if on is not None and free:
         problems.append(problem("on", "free_joint", body=f"body {free[0]!r}" if free[0] else "a body without a name"))
+    if on is not None and (mocap := [b.name for b in child.worldbody.bodies if b.mocap]):
+        body = f"body {mocap[0]!r}" if mocap[0] else "a body without a name"
+        problems.append(problem("on", "mocap_body", body=body))
     if options is not None and options not in OPTIONS:
         problems.append(problem("options", "options", None, options, known=", ".join(map(repr, OPTIONS))))
     keys = [key.name for key in child.keys if key.name]
@@ -121,7 +124,8 @@ def merge_options(spec: mujoco.MjSpec, child: mujoco.MjSpec, options: str | None
         if not np.all(rest == default):
             (changed if name in _WORLD else taken).append(_told(name, rest, default))
     total = child.compiler.settotalmass  # all other rules of its compiler go on for its bodies
-    lost += [f"settotalmass={total} (of the compiler)"] * (total > 0)
+    ours = f"{spec.compiler.settotalmass:g}" if spec.compiler.settotalmass > 0 else "none"
+    lost += [f"settotalmass={total:g} of its compiler (arena: {ours})"] * (total > 0)
     return Options(lost, changed, taken)
 
 

@@ -271,6 +271,7 @@ GENERAL = {
     # Robots, other arenas, scenes, tiles.
     "free_joint": "{at}: {body} has a free joint and would not follow the table: make it an Object of type 'mjcf', or attach "
     "it to the world.",
+    "mocap_body": "{at}: {body} is a mocap body, which MuJoCo has in the world alone: attach it without `on`.",
     "shared_name": "{at}: {who} refers to {what}. Both arenas have an element of that name, and this arena's is kept: remove "
     "the reference, or rename the {kind}.",
     "options": "{at} must be {known} or None, got {got}.",

@@ -72,5 +72,6 @@ class Ratios(NamedTuple):
                 self.written, -model.actuator_biasprm[self.ids, 2] / self.nominal.astype(weight.dtype), share
             )
         gear = xp.abs(model.actuator_gear[self.ids, 0])
-        turns = gear * gear > mujoco.mjMINVAL
-        return xp.where(turns, share * xp.sqrt(gain / weight) / xp.where(turns, gear, 1.0), 0.0)
+        moves = (gear * gear > mujoco.mjMINVAL) & (weight > 0)  # else MuJoCo takes the mass, and so the damping, for 0
+        weight, gear = xp.where(moves, weight, 1.0), xp.where(moves, gear, 1.0)
+        return xp.where(moves, share * xp.sqrt(gain / weight) / gear, 0.0)
