@@ -116,6 +116,7 @@ def test_lift():
 # Where the object is beside the goal, at rest there, and where the tool is beside the object [m], the object's speed [m/s], and the grip.
 CARRIED = [
     ([0, 0, 0], [0, 0, 0], 0.0, -1),  # placed, and held
+    ([0, 0, 0], [0, 0, 0], 0.0, 0.4),  # placed, and told to open
     ([0.03, 0, 0.005], [0, 0, 0.05], 0.05, 1),
     ([0, 0.03, 0], [0, 0, 0.2], 0.0, 1),  # let go
     ([0.06, 0, 0], [0, 0, 0.2], 0.0, 1),  # beside the goal
@@ -149,7 +150,7 @@ def test_pick_and_place():
         placed, free = aside < 0.05 and abs(off[2]) < 0.01 and speed < 0.1, 0.03 + largest / 2
         fallen = box[2] < min(tops) + moved - 0.1
         taken = 0.3 * (1 - np.tanh(6 * d)) + 0.3 * max(1 - d / 0.02, 0) * (1 - grip) / 2
-        plain = 0.6 + 0.5 * min(d / free, 1) if placed else taken
+        plain = 0.6 + 0.3 * (1 + grip) / 2 + 0.5 * min(d / free, 1) if placed else taken
         plain += (1 - np.tanh(8 * e)) * (0.3 + 1.5 * max(1 - aside / 0.8, 0))
         plain += 2 * (placed and d > free) - 5 * fallen - cost(action)
         np.testing.assert_allclose(reward, plain, atol=OFF)

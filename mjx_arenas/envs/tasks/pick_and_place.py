@@ -102,8 +102,8 @@ class PickAndPlace(ArmTask):
     The reward of a step is the sum of
 
     - until the object is placed, `0.3 (1 - tanh(6 distance))`, with the distance [m] of the tool from the middle of the object, and up to
-      0.3 for a closed grip around it, as in `Lift`. Afterwards 0.6, plus up to 0.5 as the tool moves away, until it is far enough for
-      success;
+      0.3 for a closed grip around it, as in `Lift`. Afterwards 0.6, plus up to 0.3 for an open grip, and up to 0.5 as the tool moves
+      away, until it is far enough for success;
     - `(1 - tanh(8 error)) (0.3 + 1.5 near)`, where `near` is 1 at the goal and 0 from a horizontal distance of 80 cm on;
     - 2 for success;
     - less 5 for a fall, and 0.005 times the squares of the action.
@@ -180,7 +180,8 @@ class PickAndPlace(ArmTask):
         success = placed & (off > free)
         fallen = at[2] < tops.min() - FALLEN
         taken = 0.3 * (1 - jnp.tanh(6 * off)) + 0.3 * gripped(off, action)
-        tool = jnp.where(placed, 0.6 + 0.5 * jnp.minimum(off / free, 1.0), taken)
+        let_go = 0.3 * (1 + action[-1]) / 2 + 0.5 * jnp.minimum(off / free, 1.0)
+        tool = jnp.where(placed, 0.6 + let_go, taken)
         reward = tool + high * (0.3 + 1.5 * near) + 2.0 * success - 0.005 * (action**2).sum() - 5.0 * fallen
         return reward, fallen, {"success": success.astype(jnp.float32), "distance": distance}
 
