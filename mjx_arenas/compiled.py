@@ -204,7 +204,7 @@ class Compiled(Shown):
 
     @property
     def xml(self) -> str:
-        """MJCF of the nominal arena."""
+        """MJCF of the nominal arena; a `ValueError` says what MJCF would lose of it."""
         spec = self.own_spec()
         self._parts.presence.edit(spec, self._nominal)
         return mjcf.proven(spec, specs.compiled(spec.copy(), "arena.spec"), "arena.spec")
@@ -257,7 +257,7 @@ class Compiled(Shown):
         return twin.world_spec(self.unchanged(), params)[1]
 
     def to_xml(self, params: ArenaParams) -> str:
-        """MJCF of the world with these parameters, without what is absent."""
+        """MJCF of the world with these parameters, without what is absent; a `ValueError` says what MJCF would lose of it."""
         return twin.to_xml(self.unchanged(), params)
 
     def c_batch(self, params: ArenaParams, nthread: int = 0, keys: jax.Array | None = None) -> Any:

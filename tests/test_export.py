@@ -323,6 +323,14 @@ def test_what_is_kept(what):
         np.testing.assert_allclose(getattr(written, name), getattr(made, name), rtol=1e-9, atol=1e-12)
 
 
+def test_mjcf_that_is_no_xml():
+    """MuJoCo writes such a text as it is."""
+    arena = mja.TableArena()
+    arena.spec.add_text(name="t", data="a]]>b")
+    with pytest.raises(ValueError, match=r"the MJCF that MuJoCo writes of this world cannot be read again: .*line"):
+        arena.to_xml(arena.nominal_params())
+
+
 def test_bundles_of_what_mjcf_loses(tmp_path):
     """A world that MJCF would lose is in its bundle as a compiled model, and is replayed from it."""
     arena = mja.MultiTableArena([[0, 0, 0.8], [2, 0, 0.8]], xml=MUSCLE, objects=[mja.Object("cube")])

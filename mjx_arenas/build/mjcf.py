@@ -59,7 +59,10 @@ def text(spec: mujoco.MjSpec) -> str:
     specs.make_paths_absolute(spec, "arena.spec")
     order.put_frames_in_order(spec)
     spec.compile()
-    root = ElementTree.fromstring(in_full(spec))
+    try:
+        root = ElementTree.fromstring(in_full(spec))
+    except ElementTree.ParseError as refused:
+        raise error([problem("arena.spec", "unread_mjcf", text=f"{refused}.")]) from None
     for element in root.iter("site"):
         if (name := element.get("name")) and (site := spec.site(name)) is not None:
             element.set("size", _numbers(site.size))
