@@ -2,6 +2,7 @@
 
 import functools
 import re
+import warnings
 
 import pytest
 
@@ -124,3 +125,42 @@ RIGHT = {
 def test_right(case, recwarn):
     check(RIGHT[case])
     assert not recwarn.list
+
+
+FRAMED = """<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody>
+  <frame pos="1 0 0"><body name="a" pos="0 0 1"><freejoint/><geom name="g" type="mesh" mesh="m"/></body>
+  <site name="s" pos="0 1 1"/></frame>
+  <body name="b" pos="0 3 1"><joint/><geom name="h" type="capsule" size=".1" fromto="0 0 0 0 0 1"/></body></worldbody></mujoco>"""
+NEAR = [-0.1, -0.1, 0.9], [0.1, 0.1, 1.1]
+PLACES = {
+    "a body in a frame": ("body.pos", "a", mja.Uniform(*NEAR), "body 'a'", "[0.0, 0.0, 1.0]", "[1.0, 0.0, 1.0]"),
+    "fixed": ("site.pos", "s", mja.Fixed([0, 1, 1]), "site 's'", "[0.0, 1.0, 1.0]", "[1.0, 1.0, 1.0]"),
+    "a mesh": (
+        "geom.pos",
+        "g",
+        mja.Uniform([-0.1] * 3, [0.1] * 3),
+        "geom 'g'",
+        "[0.0, 0.0, 0.0]",
+        "[0.25, 0.25, 0.25]",
+    ),
+    "where it is": ("body.pos", "a", mja.Uniform([0.9, -0.1, 0.9], [1.1, 0.1, 1.1]), "", "", ""),
+    "added": ("body.pos", "a", mja.Uniform(*NEAR, relative="add"), "", "", ""),
+    "in no frame": ("body.pos", "b", mja.Uniform([-0.1, 2.9, 0.9], [0.1, 3.1, 1.1]), "", "", ""),
+    "between two points": ("geom.pos", "h", mja.Uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6]), "", "", ""),
+}
+
+
+@pytest.mark.parametrize("case", PLACES)
+def test_places_of_the_mjcf(case):
+    """A range around the numbers of the MJCF, where the compiled model has others, was meant for these."""
+    attribute, name, dist, what, told, compiled = PLACES[case]
+    arena = mja.Arena.from_xml(FRAMED)
+    arena.vary(q=dr.Term(attribute, name))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        arena.check_ranges(mja.ArenaRanges(terms={"q": dist}))
+    said = [str(one.message) for one in caught if "in the MJCF" in str(one.message)]
+    assert len(said) == bool(what)
+    if what:
+        assert said[0].startswith(f"`ranges.terms.q` of {what} is around its place in the MJCF, {told}, which")
+        assert f"In the compiled model it is at {compiled}:" in said[0]

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import keyword
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,6 +17,7 @@ from mjx_arenas.rules import validation
 from mjx_arenas.spec import automatic, comparing, masses, specs
 from mjx_arenas.spec.objects import VARIANTS
 from mjx_arenas.terms.attributes import ATTRIBUTES
+from mjx_arenas.terms.attributes.attribute import KINDS
 from mjx_arenas.terms.elements import Elements, ids_of, in_spec
 from mjx_arenas.terms.owned import owned_by
 from mjx_arenas.terms.parts import Parts
@@ -63,6 +65,7 @@ def vary(
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
     made_of_geoms = {name: inertials.made_of_geoms(spec, term.attribute, chosen[name]) for name, term in terms.items()}
+    in_mjcf = {name: _places_in_mjcf(spec, model, term.attribute, chosen[name]) for name, term in terms.items()}
     base = _prepared(spec, model, terms, chosen)
     made = tuple(
         Elements(
@@ -73,6 +76,7 @@ def vary(
             base,
             _nominal(term, chosen[name], spec, base),
             made_of_geoms[name],
+            in_mjcf[name],
         )
         for name, term in terms.items()
     )
@@ -86,6 +90,28 @@ def vary(
     without = parts.varied[: -len(made)]
     points.warn_of_ended(*(specs.compiled(points.end(spec.copy(), v), "arena.spec") for v in (without, parts.varied)))
     return spec, parts, nominal
+
+
+def _places_in_mjcf(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, names: Sequence[str]
+) -> np.ndarray | None:
+    """(N, 3) places of elements in the MJCF, nan where the compiled ones are the same; None if they all are, or it is no place.
+
+    They are others in a <frame> with a pose, and of meshes, of which the compiler moves the middle to where the geom is.
+    """
+    kind, _, of = attribute.partition(".")
+    if of != "pos" or kind not in KINDS or kind == "joint":
+        return None
+    elements = [in_spec(spec, kind, name) for name in names]
+    told = np.array([np.full(3, np.nan) if _from_to(element) else element.pos for element in elements]).reshape(-1, 3)
+    compiled = getattr(model, f"{KINDS[kind].prefix}_pos")[ids_of(model, kind, names)]
+    told[(np.abs(told - compiled) <= 1e-9 * np.abs(compiled).max(initial=1.0)).all(-1)] = np.nan
+    return None if np.isnan(told).all() else told
+
+
+def _from_to(element: Any) -> bool:
+    """Whether the place of a geom is between two points."""
+    return hasattr(element, "fromto") and not np.isnan(element.fromto[0])
 
 
 def _prepared(

@@ -275,6 +275,9 @@ class Selected(NamedTuple):
     mask: np.ndarray  # (N, ...) bool: which of its numbers vary
     part: str = ""  # name of the part of furniture that they are of
     units: tuple[str, ...] = ()  # (N,) of each element; (): that of the quantity
+    in_mjcf: Array | None = (
+        None  # (N, ...) other numbers that the MJCF has, nan where it has the same; None: they are all the same
+    )
 
     @property
     def rules(self) -> tuple[Quantity, ...]:

@@ -80,6 +80,8 @@ WARNINGS = {
     "radians": "{at} has angles of at most {most:.3g} degrees: these angles are in degrees ({most:.3g} rad are {degrees:.3g}).",
     "milliseconds": "{at} is up to {most:g} s: time steps are in seconds (2 ms are 0.002).",
     "millimetres": "{at} is up to {most:g} m away: lengths are in metres (200 mm are 0.2).",
+    "place_in_mjcf": "{at} is around its place in the MJCF, {told}, which a <frame> or the middle of a mesh moves. In the compiled model "
+    'it is at {compiled}: give a range around that, or one with `relative="add"`.',
     "long": "{at} is up to {most:g} m: lengths are in metres (30 cm are 0.3).",
     "grams": "{at} is up to {most:g} kg, {times:,.0f} times the nominal {nominal:.3g} kg: masses are in kilograms (50 g are 0.05).",
     "dense": "{at} is {mass:g} kg, and the density {density:,.0f} kg/m^3, more than that of any metal: masses are in kilograms "

@@ -1,11 +1,12 @@
 """Ranges that are possible, and may have been meant otherwise (host)."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from mjx_arenas.params.distribution import Distribution
-from mjx_arenas.params.params import ArenaRanges, Quantity
+from mjx_arenas.params.params import ArenaRanges, Quantity, Selected
 from mjx_arenas.problem import Item, Problem, problem
 from mjx_arenas.problems.messages import warn
 from mjx_arenas.rules import unit_rules, world_rules
@@ -63,11 +64,28 @@ def warn_of_ranges(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> Non
         elif found := unit_rules.other_unit(quantity, low, high, value, _decided(name, value, labels)):
             rule, at, told = found
             warn(problem(path_of(name, labels), rule, _item(name, at, labels), None, told))
+        if absolute and name in labels.terms and (told := _as_in_mjcf(labels.terms[name], low, high, value)):
+            warn(problem(path_of(name, labels), "place_in_mjcf", _item(name, (told[0],), labels), None, told[1]))
         given = {np.shape(bound) for bound in dist.support()}
         if absolute and given == {()} and quantity.axes == "x, y, z" and _one_for_all(name, low, high, value, labels):
             of = "of a place " if quantity.of != "option" else ""
             told = {"least": low.min(), "most": high.max(), "of": of, "one": quantity.unit.strip("[]")}
             warn(problem(path_of(name, labels), "one_for_all_axes", None, None, told))
+
+
+def _as_in_mjcf(
+    selected: Selected, low: np.ndarray, high: np.ndarray, value: np.ndarray
+) -> tuple[int, dict[str, Any]] | None:
+    """The first element whose range is around its place in the MJCF, and not around that in the compiled model, and both."""
+    if selected.in_mjcf is None:
+        return None
+    told = np.asarray(selected.in_mjcf)
+    around = [((low <= x) & (x <= high) | ~selected.mask).all(-1) for x in (told, value)]
+    found = np.flatnonzero(around[0] & ~around[1] & selected.mask.any(-1))
+    if not found.size:
+        return None
+    told, compiled = (np.round(x[found[0]], 6).tolist() for x in (told, value))
+    return int(found[0]), {"told": told, "compiled": compiled}
 
 
 def _warn_of_factors(name: str, dist: Distribution, value: np.ndarray, labels: Labels) -> None:

@@ -25,6 +25,7 @@ class Elements:
     base: mujoco.MjModel  # compiled from the spec in which the elements were prepared
     nominal: np.ndarray  # (N, ...) numbers of the arena as it was configured
     weighed: tuple[str, ...] = ()  # elements whose masses the compiler made of geoms, until they were prepared
+    in_mjcf: np.ndarray | None = None  # (N, ...) as of `Selected`
 
     @property
     def content(self) -> tuple[Any, ...]:
@@ -50,7 +51,7 @@ class Elements:
         """The same, with what rules need to know of it."""
         quantity, limits = self._attribute.quantity, self._attribute.limits
         quantity = quantity._replace(limits=limits(self.base, self._ids(self.base))) if limits else quantity
-        selected = Selected(quantity, self.elements, self.mask, units=self._units)
+        selected = Selected(quantity, self.elements, self.mask, units=self._units, in_mjcf=self.in_mjcf)
         return (TermQuantity(self.name, self.attribute, selected, self.nominal),)
 
     @property
