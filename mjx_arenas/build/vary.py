@@ -93,7 +93,7 @@ def vary(
 
 
 def _places_in_mjcf(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, names: Sequence[str]
+    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, names: tuple[str, ...]
 ) -> np.ndarray | None:
     """(N, 3) places of elements in the MJCF, nan where the compiled ones are the same; None if they all are, or it is no place.
 
