@@ -112,6 +112,24 @@ def test_geoms_edited_after_vary(case):
         arena.mj_model  # noqa: B018
 
 
+@pytest.mark.parametrize("given", [False, True])
+def test_tendons_edited_after_vary(given):
+    """The length at rest is measured where the sites are, unless the MJCF gives it."""
+    ends = '<body name="it"><joint axis="0 1 0"/><geom size=".1"/><site name="end" pos=".3 0 0"/></body><site name="start"/>'
+    length = 'springlength="0.2 0.2"' if given else ""
+    tendon = (
+        f'<tendon><spatial name="t" stiffness="9" {length}><site site="start"/><site site="end"/></spatial></tendon>'
+    )
+    arena = mja.Arena.from_xml(scene(stands=ends, more=tendon))
+    arena.vary(it=dr.Term("tendon.springlength", "t"))
+    arena.spec.site("end").pos = (0.301, 0, 0)
+    if given:
+        assert arena.mj_model.tendon_lengthspring.tolist() == [[0.2, 0.2]]
+        return
+    with pytest.raises(ValueError, match=r"the length at rest of tendon 't' was edited after `arena.vary\(it=...\)`"):
+        arena.mj_model  # noqa: B018
+
+
 @pytest.mark.parametrize("attribute", ["body.mass", "geom.mass", "geom.density"])
 def test_geoms_that_weigh_nothing_after_vary(attribute):
     """They may come, and so may what has an inertial of its own."""

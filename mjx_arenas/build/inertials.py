@@ -1,4 +1,4 @@
-"""Inertials that stay when the geoms of which the compiler made them vary, or are edited (host)."""
+"""Inertials, and what else the compiler made of other numbers, that stay when these vary or are edited (host)."""
 
 from collections.abc import Collection, Sequence
 
@@ -15,63 +15,79 @@ _MOVING = {"geom.size": "size", "geom.pos": "place", "geom.rpy": "orientation"}
 _SAME = 1e-9  # relative
 
 
-def made_of_geoms(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) -> tuple[str, ...]:
-    """The elements of a term that gets masses as numbers, of which the compiler has made these of geoms until now."""
+def made_of_others(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) -> tuple[str, ...]:
+    """The elements of a term that gets numbers of its own, which the compiler has made of others until now.
+
+    These are inertials of bodies and masses, made of geoms, and lengths of tendons at rest, measured at `qpos0`.
+    """
     if ATTRIBUTES[attribute].prepare is prepare.weighed:
         return tuple(name for name in names if masses.inferred(spec.body(name)))
-    return tuple(name for name in names if np.isnan(spec.geom(name).mass)) if attribute == "geom.mass" else ()
+    if attribute == "geom.mass":
+        return tuple(name for name in names if np.isnan(spec.geom(name).mass))
+    measured = attribute == "tendon.springlength"
+    return tuple(name for name in names if spec.tendon(name).springlength[0] < 0) if measured else ()
 
 
-def check_geoms(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
-    """Refuses geoms that were added or edited since `arena.vary` has read what they weigh: bodies have kept the masses of before.
+def check_made(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
+    """Refuses what was added or edited since `arena.vary` has read numbers that are made of it, which are still those of before.
 
     Args:
         spec: of the arena, in which the terms' elements were prepared.
         varied: all terms of the arena.
 
     Raises:
-        ValueError: a body would have another mass, centre of mass or inertia, or a geom another mass.
+        ValueError: a body would have another mass, centre of mass or inertia, a geom another mass, or a tendon another length at rest.
     """
-    terms = [one for one in varied if one.weighed]
+    terms = [one for one in varied if one.made]
     if not terms:
         return
     probe = spec.copy()
     for one in terms:
-        for name in one.weighed:
+        for name in one.made:
             if one.kind == "body":
                 specs.assign(probe.body(name), explicitinertial=False, ipos=[np.nan] * 3)
-            else:
+            elif one.kind == "geom":
                 probe.geom(name).mass = np.nan
+            else:
+                probe.tendon(name).springlength = [-1, -1]
     model = specs.compiled(probe.copy(), "arena.spec")
     for one in terms:
-        changed = _other_bodies(model, one) if one.kind == "body" else _other_geoms(probe, model, one)
+        changed = _other_geoms(probe, model, one) if one.kind == "geom" else _others(model, one)
         if changed:
-            what = f"what {'the geoms of body' if one.kind == 'body' else 'geom'} {changed[0]!r} weigh"
-            told = {"what": what + "s" * (one.kind == "geom"), "name": one.name}
+            told = {"what": _TOLD[one.kind].format(changed[0]), "name": one.name}
             raise error([problem("arena.spec", "edited_since", None, None, told)])
 
 
-def _other_bodies(model: mujoco.MjModel, term: Elements) -> list[str]:
-    """The bodies of a term to which the compiler would give another inertial now."""
+_TOLD = {
+    "body": "what the geoms of body {!r} weigh",
+    "geom": "what geom {!r} weighs",
+    "tendon": "the length at rest of tendon {!r}",
+}
+_MADE = {"body": ("body_mass", "body_ipos", "body_inertia"), "tendon": ("tendon_lengthspring",)}
 
-    def inertial(of: mujoco.MjModel, name: str) -> list[np.ndarray]:
-        return [comparing.array(of, field)[of.body(name).id] for field in ("body_mass", "body_ipos", "body_inertia")]
 
-    sizes = (0.0, term.base.stat.meansize, 0.0)
-    pairs = {name: zip(inertial(model, name), inertial(term.base, name), sizes, strict=True) for name in term.weighed}
-    return [
-        name
-        for name, both in pairs.items()
-        if any(np.abs(a - b).max() > _SAME * (np.abs(b).max() + size) for a, b, size in both)
-    ]
+def _others(model: mujoco.MjModel, term: Elements) -> list[str]:
+    """The elements of a term for which the compiler would make other numbers now."""
+
+    def numbers(of: mujoco.MjModel, name: str) -> list[np.ndarray]:
+        return [comparing.array(of, field)[getattr(of, term.kind)(name).id] for field in _MADE[term.kind]]
+
+    def differ(a: np.ndarray, b: np.ndarray, field: str) -> bool:
+        size = term.base.stat.meansize if field == "body_ipos" else 0.0
+        return bool(np.abs(a - b).max() > _SAME * (np.abs(b).max() + size))
+
+    both = {
+        name: zip(numbers(model, name), numbers(term.base, name), _MADE[term.kind], strict=True) for name in term.made
+    }
+    return [name for name, pairs in both.items() if any(differ(*pair) for pair in pairs)]
 
 
 def _other_geoms(spec: mujoco.MjSpec, model: mujoco.MjModel, term: Elements) -> list[str]:
     """The geoms of a term that would weigh something else now."""
-    solids = weighed.of(spec, term.weighed)
+    solids = weighed.of(spec, term.made)
     now = dict(zip((model.geom(int(geom)).name for geom in solids.geom), solids.mass.tolist(), strict=True))
     before = dict(zip(term.elements, term.nominal.tolist(), strict=True))
-    return [name for name in term.weighed if abs(now.get(name, 0.0) - before[name]) > _SAME * before[name]]
+    return [name for name in term.made if abs(now.get(name, 0.0) - before[name]) > _SAME * before[name]]
 
 
 def warn_of_stale(spec: mujoco.MjSpec, varied: Sequence[Elements], new: Collection[str]) -> None:

@@ -64,7 +64,7 @@ def vary(
     chosen = _selected(spec, model, parts, nominal, terms)
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
-    made_of_geoms = {name: inertials.made_of_geoms(spec, term.attribute, chosen[name]) for name, term in terms.items()}
+    of_others = {name: inertials.made_of_others(spec, term.attribute, chosen[name]) for name, term in terms.items()}
     in_mjcf = {name: _places_in_mjcf(spec, model, term.attribute, chosen[name]) for name, term in terms.items()}
     base = _prepared(spec, model, terms, chosen)
     made = tuple(
@@ -75,7 +75,7 @@ def vary(
             _mask(term, chosen[name], base),
             base,
             _nominal(term, chosen[name], spec, base),
-            made_of_geoms[name],
+            of_others[name],
             in_mjcf[name],
         )
         for name, term in terms.items()

@@ -24,7 +24,7 @@ class Elements:
     mask: np.ndarray  # (N, ...) bool: which of the attribute's numbers vary
     base: mujoco.MjModel  # compiled from the spec in which the elements were prepared
     nominal: np.ndarray  # (N, ...) numbers of the arena as it was configured
-    weighed: tuple[str, ...] = ()  # elements whose masses the compiler made of geoms, until they were prepared
+    made: tuple[str, ...] = ()  # elements whose numbers the compiler made of others, until they were prepared
     in_mjcf: np.ndarray | None = None  # (N, ...) as of `Selected`
 
     @property
