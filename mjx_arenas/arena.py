@@ -1,5 +1,6 @@
 """An arena: configured and compiled once on the host, varied in thousands of worlds on the device."""
 
+import dataclasses
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +49,7 @@ class Arena(Varied, WithoutRobosuites):
         keyframes.warn_of_ranges(model, "The arena")
         validation_warnings.warn_of_overlaps(nominal, self.table_names)
         if not any(t.adopted for t in parts.tables):  # those of a scene stand as it says
-            self._warn_of_fixed(model, [-1])
+            _warn_of_fixed(model, parts, nominal, [-1])
             validation_warnings.warn_of_long(nominal, self.table_names)
         angle_rules.warn_of_degrees("table_rots", nominal.table_rots)
         validation_warnings.warn_of_far(nominal, self.table_names)
@@ -148,7 +149,7 @@ class Arena(Varied, WithoutRobosuites):
         assert model is not None
         overlaps.warn_of_gap(model, prefix, pos, parts.tables[below] if isinstance(below, int) else None)
         keyframes.warn_of_ranges(model, "`robot`", prefix)
-        self._warn_of_fixed(model, range(len(parts.furniture)), prefix)
+        _warn_of_fixed(model, self._parts, self._nominal, range(len(parts.furniture)), prefix)
 
     @one_at_a_time
     def add_camera(
@@ -229,7 +230,7 @@ class Arena(Varied, WithoutRobosuites):
         self.spec, self._parts, self._nominal, self._checked = spec, parts, nominal, None
         overlaps.warn(overlaps.overlaps(model, "", self._passing, carriers=self._parts.carriers), "The arena")
         validation_warnings.warn_of_part(nominal, parts.places.furniture, self.table_names)
-        self._warn_of_fixed(model, [len(parts.furniture) - 1])
+        _warn_of_fixed(model, parts, nominal, [len(parts.furniture) - 1])
         self._note(Arena.add_part, locals())
 
     @one_at_a_time
@@ -279,6 +280,11 @@ class Arena(Varied, WithoutRobosuites):
         self._checked = None
         self._note(Arena.vary, locals())
 
+    def adopt_spec(self, spec: mujoco.MjSpec) -> None:
+        """Takes the MJCF that `mja.save` wrote of this arena in the place of `spec`. Nothing in it counts as edited since `vary`."""
+        varied = tuple(dataclasses.replace(one, made=()) for one in self._parts.varied)
+        self.spec, self._parts = spec, dataclasses.replace(self._parts, varied=varied)
+
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """Returns a new arena with everything from both arenas.
 
@@ -315,13 +321,6 @@ class Arena(Varied, WithoutRobosuites):
         if self._calls:
             self._calls = calls.Made([*self._calls, calls.of(method, given)])
 
-    def _warn_of_fixed(self, model: mujoco.MjModel, of_part: Sequence[int], prefix: str = "") -> None:
-        """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
-        fixed, parts = layout.fixed_of(model, self._parts), self._parts
-        validation_warnings.warn_of_fixed(
-            self._nominal, parts.places, fixed, parts.follows, self.table_names, of_part, prefix
-        )
-
     @property
     def _passing(self) -> list[str]:
         """Bodies of which it does not matter what they touch: objects, which are placed elsewhere, and what is absent."""
@@ -341,6 +340,14 @@ def _checked(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams) -> mujoco.
     assemble.set_params(spec, parts, nominal)
     refusals.check_rules(spec, parts)
     return proof.check_compiles(spec)
+
+
+def _warn_of_fixed(
+    model: mujoco.MjModel, parts: Parts, nominal: ArenaParams, of_part: Sequence[int], prefix: str = ""
+) -> None:
+    """Warns of parts, or of tables (-1), that are nominally in what is fixed, of which the names have a prefix."""
+    fixed, tables = layout.fixed_of(model, parts), [t.body for t in parts.tables]
+    validation_warnings.warn_of_fixed(nominal, parts.places, fixed, parts.follows, tables, of_part, prefix)
 
 
 def _warn_of_objects(parts: Parts, nominal: ArenaParams, new: int) -> None:

@@ -17,7 +17,7 @@ from mjx_arenas.params.distribution import Distribution
 from mjx_arenas.params.distributions import Uniform
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.problems.messages import error, warn
-from mjx_arenas.spec import automatic, patterns, specs
+from mjx_arenas.spec import automatic, patterns, scaled, specs
 from mjx_arenas.terms.attributes import ATTRIBUTES, KINDS, fields
 from mjx_arenas.terms.attributes.fixed import constant
 from mjx_arenas.terms.attributes.gains import shortcut
@@ -149,9 +149,10 @@ class Term(WithKnownArguments):
         """Why the attribute of an element cannot vary, a clause; "" if it can."""
         attribute = ATTRIBUTES[self.attribute]
         why = attribute.refused(model, index) if attribute.refused else ""
+        element = in_spec(spec, self._kind, name)
         if not why and attribute.refused_in_spec:
-            why = attribute.refused_in_spec(spec, in_spec(spec, self._kind, name))
-        return why
+            why = attribute.refused_in_spec(spec, element)
+        return why or scaled.why_scaled(spec, element)
 
 
 def _found(path: str, given: str | Sequence[str], kind: str, names: list[str]) -> tuple[list[set[str]], list[Problem]]:

@@ -112,19 +112,37 @@ def test_geoms_edited_after_vary(case):
         arena.mj_model  # noqa: B018
 
 
-@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("attribute", ["body.mass", "geom.mass"])
+def test_edited_before_vary_and_saved(attribute, tmp_path):
+    """The MJCF beside the file has the body's inertial, and no longer what geoms weigh: nothing counts as edited in it."""
+    more = '<body name="it"><joint axis="0 1 0"/><geom name="box" type="box" size=".1 .05 .02" density="800"/>{}</body>'
+    arena = mja.Arena.from_xml(scene(stands=more.format('<geom name="tip" size=".02" pos=".1 0 0"/>')))
+    arena.spec.geom("tip").friction = (0.3, 0.1, 0.1)
+    arena.vary(it=dr.Term(attribute, "it" if attribute == "body.mass" else "box"))
+    mja.save(tmp_path / "arena.yaml", arena)
+    again = mja.load(tmp_path / "arena.yaml")[0]
+    params = [jax.tree.map(np.asarray, a.nominal_params()) for a in (arena, again)]
+    for a, b in zip(*(a.terms["it"] for a in params), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-6)
+    one, other = (
+        a.compile(p._replace(terms={"it": p.terms["it"] * 1.5})) for a, p in zip((arena, again), params, strict=True)
+    )
+    np.testing.assert_allclose(other.body_mass, one.body_mass, rtol=1e-12)
+    assert other.geom("tip").friction.tolist() == [0.3, 0.1, 0.1]
+
+
+@pytest.mark.parametrize("given", ["", 'springlength="0.2 0.2"', 'springlength="-0.1 0.5"', 'springlength="-1 0.5"'])
 def test_tendons_edited_after_vary(given):
     """The length at rest is measured where the sites are, unless the MJCF gives it."""
     ends = '<body name="it"><joint axis="0 1 0"/><geom size=".1"/><site name="end" pos=".3 0 0"/></body><site name="start"/>'
-    length = 'springlength="0.2 0.2"' if given else ""
     tendon = (
-        f'<tendon><spatial name="t" stiffness="9" {length}><site site="start"/><site site="end"/></spatial></tendon>'
+        f'<tendon><spatial name="t" stiffness="9" {given}><site site="start"/><site site="end"/></spatial></tendon>'
     )
     arena = mja.Arena.from_xml(scene(stands=ends, more=tendon))
     arena.vary(it=dr.Term("tendon.springlength", "t"))
     arena.spec.site("end").pos = (0.301, 0, 0)
     if given:
-        assert arena.mj_model.tendon_lengthspring.tolist() == [[0.2, 0.2]]
+        assert arena.mj_model.tendon_lengthspring.tolist() == [[*map(float, given[14:-1].split())]]
         return
     with pytest.raises(ValueError, match=r"the length at rest of tendon 't' was edited after `arena.vary\(it=...\)`"):
         arena.mj_model  # noqa: B018

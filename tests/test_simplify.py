@@ -189,9 +189,10 @@ def test_names_and_defaults_of_the_robot(kind):
     assert after.geom("g_visual_").contype == 0
 
 
-COMPILERS = ("", 'inertiafromgeom="true"', 'inertiagrouprange="0 3"', 'angle="radian"')
+COMPILERS = ("", 'inertiafromgeom="true"', 'inertiagrouprange="0 3"', 'angle="radian"', 'settotalmass="7"')
 
 
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("collision", ["primitive", "hull", "none"])
 def test_masses_and_names_stay(collision, compiler):
@@ -227,6 +228,17 @@ def test_masses_and_names_stay(collision, compiler):
         accelerations.append(data.qacc.copy())
         model.opt.disableflags = 0
     np.testing.assert_allclose(*accelerations, rtol=1e-6)
+
+
+def test_inertials_that_the_compiler_overrules():
+    """Those of bodies whose geoms stay, too, which another rule of the compiler would give back."""
+    xml = """<mujoco><compiler inertiafromgeom="true"/><asset><mesh name="rod" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"/></asset>
+    <worldbody><body name="base"><joint name="a" axis="0 1 0"/><geom type="mesh" mesh="rod" mass="1"/>
+    <body name="tip" pos=".3 0 0"><joint name="b" axis="0 1 0"/><inertial pos=".5 0 0" mass="9" diaginertia="1 1 1"/>
+    <geom size=".05" mass=".4"/></body></body></worldbody></mujoco>"""
+    before, after = mujoco.MjModel.from_xml_string(xml), mja.simplify(xml)[0].compile()
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat"):
+        np.testing.assert_allclose(getattr(after, field), getattr(before, field), rtol=1e-6, atol=1e-12, err_msg=field)
 
 
 @pytest.mark.parametrize("collision", ["capsule", "hull"])

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 import mujoco
 import numpy as np
 
+from mjx_arenas.build import springs
 from mjx_arenas.problem import problem
 from mjx_arenas.problems.messages import error, warn
 from mjx_arenas.spec import comparing, masses, specs, weighed
@@ -24,8 +25,8 @@ def made_of_others(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) ->
         return tuple(name for name in names if masses.inferred(spec.body(name)))
     if attribute == "geom.mass":
         return tuple(name for name in names if np.isnan(spec.geom(name).mass))
-    measured = attribute == "tendon.springlength"
-    return tuple(name for name in names if spec.tendon(name).springlength[0] < 0) if measured else ()
+    lengths = names if attribute == "tendon.springlength" else ()
+    return tuple(name for name in lengths if springs.measured(spec.tendon(name)))
 
 
 def check_made(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
@@ -53,6 +54,9 @@ def check_made(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
     model = specs.compiled(probe.copy(), "arena.spec")
     for one in terms:
         changed = _other_geoms(probe, model, one) if one.kind == "geom" else _others(model, one)
+        if changed and one.kind == "body" and spec.compiler.settotalmass > 0:
+            told = {"names": ["settotalmass"], "varied": one.name}
+            raise error([problem("spec.compiler", "compiler_weighs_all", None, None, told)])
         if changed:
             told = {"what": _TOLD[one.kind].format(changed[0]), "name": one.name}
             raise error([problem("arena.spec", "edited_since", None, None, told)])

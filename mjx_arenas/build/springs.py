@@ -11,6 +11,11 @@ from mjx_arenas.terms.elements import Elements
 _STIFF = ("tendon.stiffness", "tendon.stiffnesspoly")
 
 
+def measured(tendon: mujoco.MjsTendon) -> bool:
+    """Whether the compiler measures at `qpos0` how long a tendon is at rest."""
+    return bool(np.all(np.array(tendon.springlength) == -1))
+
+
 def keep(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> mujoco.MjSpec:
     """Gives tendons that have no spring in any world the nominal length of one, which no step reads.
 
@@ -21,8 +26,8 @@ def keep(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> mujoco.MjSpec:
         varied: all terms of the arena.
     """
     sprung = {name for one in varied if one.attribute in _STIFF for name in one.elements}
-    measured = [i for i, tendon in enumerate(spec.tendons) if tendon.springlength[0] < 0]
-    slack = [i for i in measured if not np.any(spec.tendons[i].stiffness) and spec.tendons[i].name not in sprung]
+    lengths = [i for i, tendon in enumerate(spec.tendons) if measured(tendon)]
+    slack = [i for i in lengths if not np.any(spec.tendons[i].stiffness) and spec.tendons[i].name not in sprung]
     if varied and slack:
         model = specs.compiled(spec.copy(), "arena.spec")
         for i in slack:

@@ -36,7 +36,7 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
     files = files_of(spec)
     with tempfile.TemporaryDirectory() as folder:
         fill(pathlib.Path(folder), files)
-        again.spec = specs.read(pathlib.Path(folder, NAME), "spec")
+        again.adopt_spec(specs.read(pathlib.Path(folder, NAME), "spec"))
         if mjcf.lost(arena.mj_model, again.mj_model):
             return False
     put(path_beside(file).parent, files)

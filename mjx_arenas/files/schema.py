@@ -117,7 +117,7 @@ class Reader:
         given = node.get("spec")
         if given is not None:
             path = os.path.join(self.file_path.parent.absolute(), given) if isinstance(given, str) else given
-            arena.spec = self.run(at, lambda: specs.read(path, "spec")) or arena.spec
+            arena.adopt_spec(self.run(at, lambda: specs.read(path, "spec")) or arena.spec)
         specs.assign(arena.spec.option, **options)
         return arena
 

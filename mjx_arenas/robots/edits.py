@@ -8,12 +8,29 @@ from mujoco.mjx._src import collision_driver
 
 from mjx_arenas.build import overlaps
 from mjx_arenas.build.from_mjcf import unused
+from mjx_arenas.problem import problem
+from mjx_arenas.problems.messages import error
 from mjx_arenas.robots import convex, fitting, rules
 from mjx_arenas.robots.fitting import Fitted
 from mjx_arenas.robots.report import Cost, Reshaped, SimplifyReport
 from mjx_arenas.robots.rules import Rules
-from mjx_arenas.spec import masses, specs
+from mjx_arenas.spec import comparing, masses, specs
 
+_STAYS = (
+    *(
+        "body_mass",
+        "body_inertia",
+        "body_ipos",
+        "body_pos",
+        "body_quat",
+        "body_gravcomp",
+        "jnt_pos",
+        "jnt_axis",
+        "jnt_range",
+    ),
+    *("jnt_stiffness", "dof_damping", "dof_armature", "dof_frictionloss", "site_pos", "site_quat", "qpos0"),
+)
+"""What no simpler shape changes."""
 _HIDDEN = 3  # the first group of geoms that MuJoCo does not draw unless it is told to
 _MESH, _GEOM = mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtObj.mjOBJ_GEOM
 _WRAPS = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
@@ -21,6 +38,7 @@ _WRAPS = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
 
 def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tuple[mujoco.MjSpec, SimplifyReport]:
     """A spec, which is used up, with what was asked for; `model` is compiled of it."""
+    asked_of = model
     aligns = [(body.joints[0], body.joints[0].align) for body in spec.bodies if masses.aligned(body)]
     before = cost(model)
     if aligns:  # the compiler moves these bodies' frames: what is edited is where the spec has it
@@ -53,6 +71,8 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     for joint, align in aligns:
         joint.align = align
     after = specs.compiled(spec, "robot")
+    if changed := sorted(name for name in _STAYS if comparing.differ(asked_of, after, name)):
+        raise error([problem("robot", "not_simplified", None, None, names=changed)])
     reshaped = tuple(
         Reshaped(model.geom(geom).name or specs.geom_name(model, geom), _kind(model, geom), *_now(shapes.get(geom)))
         for geom in asked.shapes
@@ -117,14 +137,25 @@ def _referred(spec: mujoco.MjSpec) -> set[str]:
 
 
 def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collection[int]) -> None:
-    """Gives the bodies of geoms that change the inertials that the compiler made of their geoms."""
+    """Gives the bodies of geoms that change the inertials that the compiler made of their geoms.
+
+    A `settotalmass` would scale these again and all others for the first time, so that all bodies get theirs.
+    """
     bodies = set(model.geom_bodyid[sorted(geoms)].tolist()) - {0}
-    inferred = [body for body in spec.bodies if body.id in bodies and masses.inferred(body)]
-    for body in [body for body in inferred if not model.body_mass[body.id]]:
-        inferred.remove(body)  # the compiler makes the same as before, if nothing on it weighs in another group either
+    if bodies and spec.compiler.settotalmass > 0:
+        kept = [body for body in spec.bodies if body.id]
+    else:
+        kept = [body for body in spec.bodies if body.id in bodies and masses.inferred(body)]
+    for body in [body for body in kept if not model.body_mass[body.id]]:
+        kept.remove(body)  # the compiler makes the same as before, if nothing on it weighs in another group either
         for geom in body.geoms:
             geom.mass = 0
-    for body in inferred:
+    always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    rules = [body.compiler for body in kept if body.compiler.inertiafromgeom == always]
+    for body in spec.bodies if rules else ():
+        if body.compiler in rules:  # which overruled its inertial
+            specs.assign(body, explicitinertial=False, ipos=[np.nan] * 3)
+    for body in kept:
         own = {
             "mass": model.body_mass,
             "inertia": model.body_inertia,
@@ -135,11 +166,8 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
             body, explicitinertial=True, fullinertia=np.full(6, np.nan), **{k: v[body.id] for k, v in own.items()}
         )
         body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    from_geoms = mujoco.mjtInertiaFromGeom
-    for body in inferred:
-        compiler = body.compiler
-        if compiler.inertiafromgeom == from_geoms.mjINERTIAFROMGEOM_TRUE:
-            compiler.inertiafromgeom = from_geoms.mjINERTIAFROMGEOM_AUTO
+    for rule in rules:
+        rule.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
 
 
 def _add_hulls(spec: mujoco.MjSpec, model: mujoco.MjModel, shapes: Mapping[int, Fitted]) -> dict[int, str]:

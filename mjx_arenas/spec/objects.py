@@ -12,7 +12,7 @@ from mjx_arenas.keywords import WithKnownArguments, near_file, nearest
 from mjx_arenas.params.params import DENSITIES, QUANTITIES
 from mjx_arenas.problem import Item, Problem, problem, under
 from mjx_arenas.problems.messages import error
-from mjx_arenas.spec import masses, names, specs, variants
+from mjx_arenas.spec import masses, names, scaled, specs, variants
 from mjx_arenas.spec.extents import extents, volumes
 from mjx_arenas.spec.place import Place
 from mjx_arenas.spec.rigid import flatten
@@ -288,10 +288,10 @@ def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
 def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, rigid: bool) -> None:
     item: Item = ("object", obj.name)
     child = specs.read(obj.file, "objects.file", item)
-    for joint in [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
-        child.delete(joint)
-    for key in list(child.keys):
-        child.delete(key)
+    scaled.refuse(child, "objects.file", item)
+    free = [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]
+    for one in (*free, *child.keys):
+        child.delete(one)
     rules = [name for name in masses.mass_rules(child) if name.startswith(("bound", "settotal"))]
     if rules:
         raise error([problem("objects.file", "mass_rules", item, names=rules)])
