@@ -54,6 +54,21 @@ def scale(model: mujoco.MjModel, field: str, values: np.ndarray) -> np.ndarray:
     return _norms(values) if field in _VECTORS else values
 
 
+def nothing(model: mujoco.MjModel, field: str, rounding: float) -> float:
+    """The most that rounding leaves of a number of a field that is 0: the inverse weight of a tendon that no joint makes longer.
+
+    That is a square of differences between places, by the largest inverse inertia.
+
+    Args:
+        model: compiled.
+        field: of `mjx.Model`.
+        rounding: of a number, relative to itself.
+    """
+    if field != "tendon_invweight0":
+        return 0.0
+    return rounding**2 * (1 + model.stat.extent**2) * float(model.dof_invweight0.max(initial=0.0))
+
+
 _DOUBLE = 1e-9  # of rounding in double precision, far more than there is
 
 

@@ -11,7 +11,7 @@ import worlds
 from mujoco import mjx
 
 import mjx_arenas as mja
-from mjx_arenas import furniture
+from mjx_arenas import dr, furniture
 
 ROUNDED = 400 * 2.0**-24
 
@@ -235,3 +235,21 @@ def test_shifted(impl):
         max(mja.differences(arena.apply(arena.put_model(impl), params), arena.compile(params)).values(), default=0.0)
         < ROUNDED
     )
+
+
+@pytest.mark.parametrize("coef", [0.0, 1e-3])
+def test_tendons_that_no_joint_makes_longer(coef):
+    """What rounding leaves of their inverse weights is nothing; a joint that does a little is noticed."""
+    xml = """<mujoco><worldbody><body name="a" pos="0 0 1"><joint axis="0 1 0"/><geom size=".03" pos=".2 0 0"/>
+    <body name="b" pos=".3 .1 0" euler="10 20 30"><joint name="j" axis="0 1 0"/><geom size=".03" pos=".2 0 0"/><site name="e" pos="{} 0 0"/>
+    <body name="c" pos=".1 .02 .3" euler="30 20 10"><geom size=".01"/><site name="r" pos=".1 .03 .05"/></body></body></body>
+    </worldbody><tendon><spatial name="t"><site site="e"/><site site="r"/></spatial>
+    <fixed name="f"><joint joint="j" coef="{}"/></fixed></tendon></mujoco>"""
+    arena = mja.Arena.from_xml(xml.format(0.1, coef))
+    arena.vary(mass=dr.Term("geom.mass"))
+    params = jax.tree.map(np.asarray, arena.nominal_params())
+    params = params._replace(terms={"mass": params.terms["mass"] * [0.7, 1.3, 2.0]})
+    model, compiled = arena.apply(arena.put_model("warp"), params), arena.compile(params)
+    assert mja.differences(model, compiled).get("tendon_invweight0", 0.0) < 2e-5
+    other = mujoco.MjModel.from_xml_string(xml.format(0.1, coef + 1e-5))
+    assert mja.differences(arena.put_model("warp"), other)["tendon_invweight0"] > 3e-3

@@ -354,3 +354,14 @@ def test_assets_in_memory_under_a_folder(tmp_path):
     arena.export(arena.nominal_params(), tmp_path / "world")
     written = mujoco.MjModel.from_xml_path(str(tmp_path / "world" / "world.xml"))
     np.testing.assert_array_equal(written.mesh_vert, arena.mj_model.mesh_vert)
+
+
+@pytest.mark.skipif(not hasattr(mujoco.MjSpec().compiler, "savecompiled"), reason="since MuJoCo 3.16")
+def test_how_the_mjcf_would_be_saved():
+    """What the compiler is told of saving does not reach the MJCF of worlds, which has what was compiled."""
+    rules = '<compiler savecompiled="false" savecanonical="false"/>'
+    servo = '<actuator><position joint="j" kp="9" dampratio="1"/></actuator>'
+    body = '<worldbody><body><joint name="j"/><geom size=".1" pos=".1 0 0"/></body></worldbody>'
+    arena = mja.Arena.from_xml(f"<mujoco>{rules}{body}{servo}</mujoco>")
+    for text in (arena.xml, arena.to_xml(arena.nominal_params())):
+        assert mjcf.lost(arena.mj_model, mujoco.MjModel.from_xml_string(text)) == []

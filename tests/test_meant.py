@@ -130,8 +130,10 @@ def test_right(case, recwarn):
 FRAMED = """<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody>
   <frame pos="1 0 0"><body name="a" pos="0 0 1"><freejoint/><geom name="g" type="mesh" mesh="m"/></body>
   <site name="s" pos="0 1 1"/></frame>
-  <body name="b" pos="0 3 1"><joint/><geom name="h" type="capsule" size=".1" fromto="0 0 0 0 0 1"/></body></worldbody></mujoco>"""
+  <body name="b" pos="0 3 1"><frame pos="0 0 1"><joint name="j"/></frame>
+  <geom name="h" type="capsule" size=".1" fromto="0 0 0 0 0 1"/></body></worldbody></mujoco>"""
 NEAR = [-0.1, -0.1, 0.9], [0.1, 0.1, 1.1]
+TURNED = {"r": dr.Term("body.rpy", "a")}
 PLACES = {
     "a body in a frame": ("body.pos", "a", mja.Uniform(*NEAR), "body 'a'", "[0.0, 0.0, 1.0]", "[1.0, 0.0, 1.0]"),
     "fixed": ("site.pos", "s", mja.Fixed([0, 1, 1]), "site 's'", "[0.0, 1.0, 1.0]", "[1.0, 1.0, 1.0]"),
@@ -143,6 +145,14 @@ PLACES = {
         "[0.0, 0.0, 0.0]",
         "[0.25, 0.25, 0.25]",
     ),
+    "a joint": (
+        "joint.pos",
+        "j",
+        mja.Uniform([-0.1] * 3, [0.1] * 3),
+        "joint 'j'",
+        "[0.0, 0.0, 0.0]",
+        "[0.0, 0.0, 1.0]",
+    ),
     "where it is": ("body.pos", "a", mja.Uniform([0.9, -0.1, 0.9], [1.1, 0.1, 1.1]), "", "", ""),
     "added": ("body.pos", "a", mja.Uniform(*NEAR, relative="add"), "", "", ""),
     "in no frame": ("body.pos", "b", mja.Uniform([-0.1, 2.9, 0.9], [0.1, 3.1, 1.1]), "", "", ""),
@@ -151,11 +161,14 @@ PLACES = {
 
 
 @pytest.mark.parametrize("case", PLACES)
-def test_places_of_the_mjcf(case):
-    """A range around the numbers of the MJCF, where the compiled model has others, was meant for these."""
+@pytest.mark.parametrize("turned", [(), ("first",), ("together",)])
+def test_places_of_the_mjcf(case, turned):
+    """A range around the numbers of the MJCF, where the compiled model has others, was meant for these; terms that turn it, too."""
     attribute, name, dist, what, told, compiled = PLACES[case]
     arena = mja.Arena.from_xml(FRAMED)
-    arena.vary(q=dr.Term(attribute, name))
+    if "first" in turned:
+        arena.vary(**TURNED)
+    arena.vary(q=dr.Term(attribute, name), **(TURNED if "together" in turned else {}))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         arena.check_ranges(mja.ArenaRanges(terms={"q": dist}))

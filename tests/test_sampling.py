@@ -7,6 +7,8 @@ import pytest
 import worlds
 
 import mjx_arenas as mja
+from mjx_arenas import dr
+from mjx_arenas.envs.curriculum import widening
 from mjx_arenas.params.params import QUANTITIES, named
 
 N = 4000
@@ -99,6 +101,22 @@ def test_left_out_stays_nominal():
     x, nominal = samples(mja.ArenaRanges(table_rots=mja.Uniform(-1, 1)), n=3), worlds.arena(2).nominal_params()
     for name in set(QUANTITIES) - {"table_rots"}:
         np.testing.assert_array_equal(getattr(x, name), np.broadcast_to(getattr(nominal, name), getattr(x, name).shape))
+
+
+def test_terms_without_a_distribution_stay_nominal():
+    """None for one means the same as leaving it out, as for the quantities of tables: what a preset ranges can be taken away."""
+    arena = mja.Arena.from_xml(
+        '<mujoco><worldbody><body><joint/><geom name="g" size=".1"/></body></worldbody></mujoco>'
+    )
+    arena.vary(mass=dr.Term("geom.mass"), friction=dr.Term("geom.friction"))
+    friction = mja.Uniform(0.5, 0.6)
+    drawn = [
+        arena.sample_params(jax.random.key(0), mja.ArenaRanges(terms=t))
+        for t in ({"friction": friction}, {"mass": None, "friction": friction})
+    ]
+    jax.tree.map(np.testing.assert_array_equal, *drawn)
+    np.testing.assert_array_equal(drawn[1].terms["mass"], arena.nominal_params().terms["mass"])
+    assert widening(arena, mja.ArenaRanges(terms={"mass": None}))(0.5).terms == {}
 
 
 @pytest.mark.slow

@@ -76,6 +76,19 @@ def test_oracle(impl):
             assert data.geom(slab).xmat[8] == pytest.approx(1)
 
 
+def test_inertials_of_geoms():
+    """Where the compiler makes them all of geoms, tables stay tables, and all else weighs what it weighed."""
+    xml = """<mujoco><compiler inertiafromgeom="true"/><worldbody>
+      <body name="desk" pos="0 0 .5"><geom name="top" type="box" size=".4 .4 .02"/>
+      <geom name="leg" type="box" size=".02 .02 .1" pos=".1 0 -.3" contype="0" conaffinity="0"/></body>
+      <body name="one" pos="2 0 1"><freejoint/><inertial pos=".5 0 0" mass="9" diaginertia="1 1 1"/><geom size=".05" mass=".4"/></body>
+      <body name="two" pos="3 0 1"><freejoint/><inertial pos=".5 0 0" mass="9" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    before, after = mujoco.MjModel.from_xml_string(xml), mja.Arena.from_xml(xml, ["desk"]).mj_model
+    for name in ("one", "two"):
+        for field in ("mass", "ipos", "inertia"):
+            np.testing.assert_array_equal(getattr(after.body(name), field), getattr(before.body(name), field))
+
+
 def test_what_rests_on_them():
     """Objects fall onto nested slabs, in C MuJoCo, and rest at the heights of the formula."""
     key = jax.random.key(3)

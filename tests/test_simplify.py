@@ -230,6 +230,26 @@ def test_masses_and_names_stay(collision, compiler):
     np.testing.assert_allclose(*accelerations, rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("on", "more"),
+    [
+        ('<site name="s" type="mesh" mesh="pad"/>', ""),
+        ("", '<sensor><tactile name="t" mesh="pad" geom="g"/></sensor>'),
+        ("", '<custom><tuple name="t"><element objtype="mesh" objname="pad"/></tuple></custom>'),
+    ],
+)
+def test_meshes_that_something_else_has(on, more):
+    corners = 'vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"'
+    xml = f"""<mujoco><asset><mesh name="m" {corners}/><mesh name="pad" {corners}/></asset><worldbody>
+    <body name="b"><joint/><geom name="g" type="mesh" mesh="m"/>{on}</body></worldbody>{more}</mujoco>"""
+    try:
+        mujoco.MjModel.from_xml_string(xml)
+    except ValueError:
+        pytest.skip("this MuJoCo has none of these")
+    spec, _ = mja.simplify(xml, visual=False)
+    assert [mesh.name for mesh in spec.meshes] == ["pad"]
+
+
 def test_inertials_that_the_compiler_overrules():
     """Those of bodies whose geoms stay, too, which another rule of the compiler would give back."""
     xml = """<mujoco><compiler inertiafromgeom="true"/><asset><mesh name="rod" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"/></asset>

@@ -226,6 +226,31 @@ def test_welds(weld, own):
         mja.Arena.from_xml(TIED.format(weld)).vary(x=dr.Term("equality.data", "e", ("6",)))
 
 
+UNUSED = {
+    '<joint name="e" joint1="j" joint2="k"/>': [0, 1, 2, 3, 4],
+    '<connect name="e" body1="b" body2="c" anchor=".1 0 0"/>': [0, 1, 2],
+    '<tendon name="e" tendon1="t"/>': [0, 1, 2, 3, 4],
+}
+
+
+@pytest.mark.parametrize("equality", UNUSED)
+def test_numbers_that_no_equality_reads(equality):
+    """They stay as they are, as MJCF has no place for them: a world can be written and read back."""
+    bodies = "".join(
+        f'<body name="{b}"><joint name="{j}"/><geom size=".1" pos="{x} 0 0"/></body>' for b, j, x in ("bj1", "ck2")
+    )
+    tendon = '<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>'
+    arena = mja.Arena.from_xml(
+        f"<mujoco><worldbody>{bodies}</worldbody>{tendon}<equality>{equality}</equality></mujoco>"
+    )
+    arena.vary(x=dr.Term("equality.data", "e"))
+    assert np.flatnonzero(arena.record.parts.varied[0].mask[0]).tolist() == UNUSED[equality]
+    nominal = jax.tree.map(np.asarray, arena.nominal_params())
+    params = with_values(nominal, {"x": nominal.terms["x"] + 0.1})
+    again = mujoco.MjModel.from_xml_string(arena.to_xml(params))
+    np.testing.assert_allclose(again.eq_data, arena.compile(params).eq_data, rtol=1e-9)
+
+
 def test_connected_sites():
     """A connection of sites has no numbers."""
     why = "it connects sites, and has no numbers of its own: vary `site.pos`"

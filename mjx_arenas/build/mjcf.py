@@ -56,6 +56,9 @@ def text(spec: mujoco.MjSpec) -> str:
     which `<general>` has in its `biasprm` and MuJoCo replaces by the damping, and texts with characters that XML escapes.
     """
     spec = spec.copy()
+    for name in ("savecompiled", "savecanonical"):  # as MuJoCo before 3.16 writes all
+        if hasattr(spec.compiler, name):
+            setattr(spec.compiler, name, True)
     specs.make_paths_absolute(spec, "arena.spec")
     order.put_frames_in_order(spec)
     spec.compile()

@@ -65,7 +65,7 @@ def vary(
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
     of_others = {name: inertials.made_of_others(spec, term.attribute, chosen[name]) for name, term in terms.items()}
-    in_mjcf = {name: _places_in_mjcf(spec, model, term.attribute, chosen[name]) for name, term in terms.items()}
+    in_mjcf = {name: _places_in_mjcf(spec, model, term.attribute, chosen[name], parts) for name, term in terms.items()}
     base = _prepared(spec, model, terms, chosen)
     made = tuple(
         Elements(
@@ -93,20 +93,28 @@ def vary(
 
 
 def _places_in_mjcf(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, names: tuple[str, ...]
+    spec: mujoco.MjSpec, model: mujoco.MjModel, attribute: str, names: tuple[str, ...], parts: Parts
 ) -> np.ndarray | None:
-    """(N, 3) places of elements in the MJCF, nan where the compiled ones are the same; None if they all are, or it is no place.
+    """(N, 3) places of elements in the MJCF, nan where the compiled ones are the same; None if they all are, or nothing places them.
 
-    They are others in a <frame> with a pose, and of meshes, of which the compiler moves the middle to where the geom is.
+    They are others in a <frame> with a pose, and of meshes, of which the compiler moves the middle to where the geom is. What an
+    earlier term has taken out of its frame is where that one found it.
     """
-    kind, _, of = attribute.partition(".")
-    if of != "pos" or kind not in KINDS or kind == "joint":
+    kind = attribute.partition(".")[0]
+    if kind not in KINDS or not attribute.endswith(_OUT_OF_FRAMES):
         return None
-    elements = [in_spec(spec, kind, name) for name in names]
-    told = np.array([np.full(3, np.nan) if _from_to(element) else element.pos for element in elements]).reshape(-1, 3)
+    before = [one for one in parts.varied if one.kind == kind and one.in_mjcf is not None]
+    earlier = {name: place for one in before for name, place in zip(one.elements, one.in_mjcf, strict=True)}
+    elements = {name: in_spec(spec, kind, name) for name in names}
+    now = [np.full(3, np.nan) if _from_to(element) else element.pos for element in elements.values()]
+    told = np.array([earlier.get(name, place) for name, place in zip(names, now, strict=True)]).reshape(-1, 3)
     compiled = getattr(model, f"{KINDS[kind].prefix}_pos")[ids_of(model, kind, names)]
     told[(np.abs(told - compiled) <= 1e-9 * np.abs(compiled).max(initial=1.0)).all(-1)] = np.nan
     return None if np.isnan(told).all() else told
+
+
+_OUT_OF_FRAMES = (".pos", ".rpy", "joint.axis", "light.dir")
+"""Attributes for which elements come out of their frames, by how they end."""
 
 
 def _from_to(element: Any) -> bool:

@@ -114,7 +114,7 @@ class ArenaRanges(NamedTuple):
             table may start inside each other.
         object_active: (K,) which objects are there, with the same distributions as `has_legs`.
         workspace: rectangle in which tables get random places apart from each other; it replaces x and y of `table_offsets`.
-        terms: (N, ...) distributions of quantities that `arena.vary` made, by their names.
+        terms: (N, ...) distributions of quantities that `arena.vary` made, by their names; None: the quantity stays nominal.
     """
 
     table_offsets: Distribution | None = None
@@ -131,7 +131,7 @@ class ArenaRanges(NamedTuple):
     object_tables: Distribution | None = None
     object_active: Distribution | None = None
     workspace: Workspace | None = None
-    terms: Mapping[str, Distribution] = {}
+    terms: Mapping[str, Distribution | None] = {}
 
     def __hash__(self) -> int:
         return hash((*self[:-1], *sorted(self.terms.items(), key=lambda item: item[0])))
@@ -139,9 +139,8 @@ class ArenaRanges(NamedTuple):
     @property
     def distributions(self) -> dict[str, Distribution]:
         """The distributions that are given, by the names of their quantities."""
-        return {name: dist for name, dist in self._asdict().items() if isinstance(dist, Distribution)} | dict(
-            self.terms
-        )
+        own = {name: dist for name, dist in self._asdict().items() if isinstance(dist, Distribution)}
+        return own | {name: dist for name, dist in self.terms.items() if dist is not None}
 
     @property
     def varying(self) -> frozenset[str]:

@@ -17,6 +17,7 @@ from mjx_arenas.rules import validation
 from mjx_arenas.spec.comparing import NOT_READ
 
 _NOT_READ = NOT_READ | {"_sizes", "names", "paths", "text_data", "ngravcomp"}  # the first: counts of `MjModel`
+_SINGLE = 2.0**-20  # a few roundings of a number in single precision
 _ROUNDED = 2.0**-52  # of a row's largest number: what double precision leaves of a difference that is 0
 
 
@@ -103,7 +104,8 @@ def _off(twin: mujoco.MjModel, field: str, got: np.ndarray, want: np.ndarray) ->
     got, want = np.atleast_1d(got).astype(float), np.atleast_1d(want).astype(float)
     size = scales.scale(twin, field.removeprefix("_impl."), want)
     size = np.maximum(size, _ROUNDED * np.abs(want).max(-1, initial=0.0, keepdims=True))
-    same = (got == want) | (np.isnan(got) & np.isnan(want))
+    none = scales.nothing(twin, field.removeprefix("_impl."), _SINGLE)
+    same = (got == want) | (np.isnan(got) & np.isnan(want)) | (np.maximum(np.abs(got), np.abs(want)) <= none)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(
             np.where(same, 0.0, np.nan_to_num(np.abs(got - want) / size, nan=np.inf, posinf=np.inf)).max(initial=0.0)

@@ -150,11 +150,6 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
         kept.remove(body)  # the compiler makes the same as before, if nothing on it weighs in another group either
         for geom in body.geoms:
             geom.mass = 0
-    always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    rules = [body.compiler for body in kept if body.compiler.inertiafromgeom == always]
-    for body in spec.bodies if rules else ():
-        if body.compiler in rules:  # which overruled its inertial
-            specs.assign(body, explicitinertial=False, ipos=[np.nan] * 3)
     for body in kept:
         own = {
             "mass": model.body_mass,
@@ -166,8 +161,6 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
             body, explicitinertial=True, fullinertia=np.full(6, np.nan), **{k: v[body.id] for k, v in own.items()}
         )
         body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
-    for rule in rules:
-        rule.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
 
 
 def _add_hulls(spec: mujoco.MjSpec, model: mujoco.MjModel, shapes: Mapping[int, Fitted]) -> dict[int, str]:
@@ -207,8 +200,11 @@ def _reshape(model: mujoco.MjModel, index: int, geom: mujoco.MjsGeom, shape: Fit
 
 
 def _forget_meshes(spec: mujoco.MjSpec) -> None:
-    """Deletes meshes that no geom has, which would be read all the same."""
-    used = {geom.meshname for geom in spec.geoms}
+    """Deletes meshes that nothing has, which would be read all the same."""
+    mesh = mujoco.mjtObj.mjOBJ_MESH
+    used = {getattr(one, "meshname", "") for one in (*spec.geoms, *spec.sites)}
+    used |= {sensor.objname for sensor in spec.sensors if sensor.objtype == mesh}  # tactile ones
+    used |= {name for one in spec.tuples for name, kind in zip(one.objname, one.objtype, strict=True) if kind == mesh}
     for mesh in [mesh for mesh in spec.meshes if mesh.name not in used]:
         spec.delete(mesh)
 

@@ -1,6 +1,7 @@
 """Rules of MuJoCo's compiler by which masses are other than those of bodies and geoms alone (host)."""
 
 import mujoco
+import numpy as np
 
 BOUNDS = ("boundmass", "boundinertia")
 """Rules of the compiler by which masses and inertias are at least as large. They hold for each body by the MJCF that it comes from."""
@@ -21,6 +22,11 @@ def weighs(geom: mujoco.MjsGeom) -> bool:
     return low <= geom.group <= high
 
 
+def weight(geom: mujoco.MjsGeom) -> float:
+    """What says how heavy a geom is: its mass, or its density where it has none."""
+    return geom.density if np.isnan(geom.mass) else geom.mass
+
+
 def weigh_groups(spec: mujoco.MjSpec) -> None:
     """Takes the mass from the geoms that the compiler's `inertiagrouprange` leaves out, and has it leave out none.
 
@@ -39,6 +45,17 @@ def inferred(body: mujoco.MjsBody) -> bool:
     if rule == rules.mjINERTIAFROMGEOM_AUTO:
         return not body.explicitinertial
     return rule == rules.mjINERTIAFROMGEOM_TRUE
+
+
+def allow_inertials(spec: mujoco.MjSpec) -> None:
+    """Lets bodies have inertials of their own where the compiler makes all of geoms (`inertiafromgeom="true"`); none is another."""
+    rules = mujoco.mjtInertiaFromGeom
+    ruled = [body for body in spec.bodies if body.compiler.inertiafromgeom == rules.mjINERTIAFROMGEOM_TRUE]
+    for body in ruled:
+        if any(weighs(geom) and weight(geom) for geom in body.geoms):  # else the compiler keeps what the body has
+            body.explicitinertial, body.ipos = False, [np.nan] * 3
+    for body in ruled:
+        body.compiler.inertiafromgeom = rules.mjINERTIAFROMGEOM_AUTO
 
 
 def aligned(body: mujoco.MjsBody) -> bool:

@@ -25,7 +25,7 @@ class Elements:
     base: mujoco.MjModel  # compiled from the spec in which the elements were prepared
     nominal: np.ndarray  # (N, ...) numbers of the arena as it was configured
     made: tuple[str, ...] = ()  # elements whose numbers the compiler made of others, until they were prepared
-    in_mjcf: np.ndarray | None = None  # (N, ...) as of `Selected`
+    in_mjcf: np.ndarray | None = None  # (N, 3) places as of `Selected`, also of terms that turn elements
 
     @property
     def content(self) -> tuple[Any, ...]:
@@ -51,7 +51,8 @@ class Elements:
         """The same, with what rules need to know of it."""
         quantity, limits = self._attribute.quantity, self._attribute.limits
         quantity = quantity._replace(limits=limits(self.base, self._ids(self.base))) if limits else quantity
-        selected = Selected(quantity, self.elements, self.mask, units=self._units, in_mjcf=self.in_mjcf)
+        places = self.in_mjcf if self.attribute.endswith(".pos") else None
+        selected = Selected(quantity, self.elements, self.mask, units=self._units, in_mjcf=places)
         return (TermQuantity(self.name, self.attribute, selected, self.nominal),)
 
     @property

@@ -77,7 +77,10 @@ ACTUATOR = {
 
 
 def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
-    """(N, 11) bool: the numbers of equalities that no pose at `qpos0` and no site decides, without quaternions, whose length is 1."""
+    """(N, 11) bool: the numbers of equalities that no pose at `qpos0` and no site decides, without quaternions, whose length is 1.
+
+    Those that nothing reads have no place in MJCF: the last six of joints and tendons, and the last eight of connections.
+    """
     kind, data = model.eq_type[ids], model.eq_data[ids]
     sites, bodies = (model.eq_objtype[ids] == one for one in (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY))
     connects, welds = kind == mujoco.mjtEq.mjEQ_CONNECT, kind == mujoco.mjtEq.mjEQ_WELD
@@ -85,7 +88,8 @@ def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     pose, quat = (column >= 3) & (column < 10), (column >= 6) & (column < 10)
     posed = welds & bodies & (data[:, 11] != 0)  # as MuJoCo marks them
     not_given = [
-        (connects & bodies, (column >= 3) & (column < 6)),
+        (connects, column >= 3),
+        ((kind == mujoco.mjtEq.mjEQ_JOINT) | (kind == mujoco.mjtEq.mjEQ_TENDON), column >= 5),
         (posed, pose),
         (welds & bodies, quat),
         (welds & sites, column < 10),

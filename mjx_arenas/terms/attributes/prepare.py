@@ -27,8 +27,7 @@ def shared(geom: Any) -> bool:
 
 def weighs(geom: Any) -> bool:
     """Whether the compiler makes an inertial of the geom."""
-    weight = geom.density if np.isnan(geom.mass) else geom.mass
-    return masses.inferred(geom.parent) and masses.weighs(geom) and weight != 0
+    return masses.inferred(geom.parent) and masses.weighs(geom) and masses.weight(geom) != 0
 
 
 def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:
