@@ -509,19 +509,21 @@ def test_wrong_use(foil, given, sentence):
 def test_bundles_that_are_none(foil, tmp_path, monkeypatch):
     """What is no bundle is neither replaced nor replayed."""
     report = mja.check(foil, TURNED, 1, n_steps=12, engine="c")
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
+    (mine := tmp_path / "mine").mkdir()
+    (mine / "thesis.txt").write_text("all of it")
     with pytest.raises(FileExistsError, match="is there already and is no bundle: choose another folder"):
-        report.save_bundle(tmp_path / "mine", 0)
+        report.save_bundle(mine, 0)
     assert [f.name for f in tmp_path.rglob("*.*")] == ["thesis.txt"]
     with pytest.raises(FileNotFoundError, match="is no bundle"):
-        mja.replay(tmp_path / "mine")
+        mja.replay(mine)
     with pytest.raises(FileNotFoundError, match="does not exist"):
         mja.replay(tmp_path / "yours")
     with pytest.raises(ValueError, match="`world` must be one of the worlds that were checked, got 5"):
         report.save_bundle(tmp_path / "five", 5)
 
     report.save_bundle(tmp_path / "bundle", 0)
+    with pytest.raises(FileNotFoundError, match=r"is no bundle of a failed world: .*; 'bundle' in it is one"):
+        mja.replay(tmp_path)
     (tmp_path / "bundle" / "note.txt").write_text("of the first")
     for wrong in (OSError(28, "No space left on device"), KeyboardInterrupt()):
 
@@ -586,15 +588,12 @@ def test_invalid_by_a_term(tmp_path):
     xml = '<mujoco><worldbody><body name="arm"><joint name="hinge" range="-1 1"/><geom size=".1"/></body></worldbody></mujoco>'
     arena = mja.Arena.from_xml(xml)
     arena.vary(reach=dr.Term("joint.range", "hinge"))
-    report = mja.check(
-        arena, mja.ArenaRanges(terms={"reach": mja.Uniform([[-1, -1]], [[1, 1]])}), 16, n_steps=1, engine="c"
-    )
+    ranges = mja.ArenaRanges(terms={"reach": mja.Uniform([[-1, -1]], [[1, 1]])})
+    report = mja.check(arena, ranges, 16, n_steps=1, engine="c")
     world = report.worst[0]
     report.save_bundle(tmp_path / "bundle", world)
     replay = mja.replay(tmp_path / "bundle")
     assert replay.reproduced
     assert replay.found == report.of(world)
-    assert (
-        "`terms.reach` of joint 'hinge': the first number must be below the second"
-        in replay.found["invalid_arena"].what
-    )
+    said = "`terms.reach` of joint 'hinge': the first number must be below the second"
+    assert said in replay.found["invalid_arena"].what

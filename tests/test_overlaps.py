@@ -26,7 +26,7 @@ ELSEWHERE, OR_ELSE = (
     "Put one of each pair elsewhere",
     ", or name the `keyframe` in which the robot starts, if they are apart in it.",
 )
-LOST = "Beside such contacts MJX loses friction and support of all else in the world. "
+LOST = "Beside such contacts MJX diverges, or loses friction and support of all else in the world. "
 
 
 def attached(xml, **kwargs):

@@ -127,7 +127,11 @@ def _warn(found: list[Overlap], where: str, rule: str, unnamed: bool) -> None:
         return
     stuck = ", from which no joint parts them"
     told = [f"{' and '.join(o.geoms)} {o.depth:.3f} m {_listed(o.states)}{stuck * o.stuck}" for o in found[:SHOWN]]
-    lost = " Beside such contacts MJX loses friction and support of all else in the world." if found[0].stuck else ""
+    lost = (
+        " Beside such contacts MJX diverges, or loses friction and support of all else in the world."
+        if found[0].stuck
+        else ""
+    )
     more = f", and {len(found) - SHOWN} more pairs" if len(found) > SHOWN else ""
     first = next((o.bodies for o in found if all(o.bodies)), ("...", "..."))
     or_else = ", or name the `keyframe` in which the robot starts, if they are apart in it" * unnamed

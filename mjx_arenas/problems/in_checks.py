@@ -8,7 +8,7 @@ IN_CHECKS = {
     "no_picture": "There is no picture of this world: MuJoCo does not compile it.",
     "no_bundle_here": "{got} is there already and is no bundle: choose another folder.",
     "no_bundle": "{got} {what}: give a folder that `check` or `save_bundle` wrote.",
-    "bundle_lacks": "Folder {got} is no bundle of a failed world: {file} is missing.",
+    "bundle_lacks": "Folder {got} is no bundle of a failed world: {file} is missing{inside}.",
     "damaged": "{file!r} is not what `check` wrote: {why}.",
     # Randomized models.
     "model_swapped": "{at} must be the model that the randomizer returned, got {got}: is it swapped with `in_axes`?",

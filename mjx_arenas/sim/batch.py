@@ -223,7 +223,8 @@ def _step(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> m
 
 def _check_worlds(batch: ArenaBatch, data: mjx.Data, spread: devices.Spread | None) -> None:
     if data.qpos.shape[:1] != (batch.n_worlds,) or data.qpos.ndim != 2:
-        worlds = f"{data.qpos.shape[0]} worlds" if data.qpos.ndim == 2 else "one world"
+        n = data.qpos.shape[0]
+        worlds = f"{n} world{'s' * (n != 1)}" if data.qpos.ndim == 2 else "one world"
         raise validation.error([problem("data", "worlds_of", n=batch.n_worlds, whose="the batch", of=worlds)])
     m = batch.model
     per_body = {
