@@ -137,8 +137,7 @@ def _settle(spec: mujoco.MjSpec, one: Follower, names: TableNames, quat: np.ndar
     geom, body = spec.geom(one.geom), spec.body(names.body)
     if geom.parent != body:
         geom = specs.move_geom(spec, geom, body)
-    elif geom.frame is not None:
-        geom.set_frame(body.add_frame())
+    specs.out_of_frames(geom)
     geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     size = geom.size if geom.type == _GEOM.mjGEOM_MESH else one.size
     specs.assign(geom, quat=quat, fromto=[np.nan] * 6, size=size)

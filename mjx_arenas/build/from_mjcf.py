@@ -215,10 +215,8 @@ def _reframe(body: mujoco.MjsBody, slab: mujoco.MjsGeom, at: np.ndarray, turn: n
     for kind in ("geoms", "sites", "bodies", "cameras", "lights", "frames"):
         for element in [e for e in getattr(body, kind) if e.frame is None and e not in (slab, frame)]:
             element.set_frame(frame)
-    if slab.frame is not None:
-        slab.set_frame(body.add_frame())
-    if body.frame is not None:
-        body.set_frame(body.parent.add_frame())
+    specs.out_of_frames(slab)
+    specs.out_of_frames(body)
 
 
 def _split(spec: mujoco.MjSpec, slab: mujoco.MjsGeom) -> mujoco.MjsGeom:

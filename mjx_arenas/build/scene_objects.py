@@ -137,7 +137,7 @@ def _adopted(spec: mujoco.MjSpec, scene: _Scene, obj: Object) -> SceneObject | l
     if obj.mass is not None:
         objects.scale_mass(body, obj.mass / measures.mass)
         measures = dataclasses.replace(measures, mass=obj.mass, density=measures.density * obj.mass / measures.mass)
-    _settle(spec, body, kind)
+    _settle(body, kind)
     found = {f.name: getattr(obj, f.name) for f in dataclasses.fields(Object)} | {"type": kind, "on": on}
     geom, joint = body.geoms[0].name if len(body.geoms) else "", _free_joint(body).name
     found |= {"pos": tuple(pos.tolist()), "rot": stands.yaw - yaw, "own_joint": joint, "own_geom": geom}
@@ -191,15 +191,13 @@ def _measured(spec: mujoco.MjSpec, scene: _Scene, obj: Object, stands: Stance) -
     return kind, Measures(size, middle, mass, mass / scene.volume[obj.name], friction, rgba)
 
 
-def _settle(spec: mujoco.MjSpec, body: mujoco.MjsBody, kind: str) -> None:
+def _settle(body: mujoco.MjsBody, kind: str) -> None:
     """Takes a body out of its frame, and has its place, and a primitive shape's, be numbers that parameters decide."""
-    if body.frame is not None:
-        body.set_frame(spec.worldbody.add_frame())
+    specs.out_of_frames(body)
     body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     if kind != "mjcf":
         geom = body.geoms[0]
         geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         quat = (np.sqrt(0.5), 0, np.sqrt(0.5), 0) if kind == "capsule" else (1, 0, 0, 0)
         specs.assign(geom, pos=(0, 0, 0), quat=quat, fromto=[np.nan] * 6)
-        if geom.frame is not None:
-            geom.set_frame(body.add_frame())
+        specs.out_of_frames(geom)

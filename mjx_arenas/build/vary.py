@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr
-from mjx_arenas.build import inertials, points
+from mjx_arenas.build import frozen, points
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.problem import Problem, problem, under
 from mjx_arenas.rules import validation
@@ -64,7 +64,7 @@ def vary(
     chosen = _selected(spec, model, parts, nominal, terms)
     kinds = {name: term.attribute.partition(".")[0] for name, term in terms.items()}
     automatic.take_back(given, {(kinds[name], element) for name, names in chosen.items() for element in names})
-    of_others = {name: inertials.made_of_others(spec, term.attribute, chosen[name]) for name, term in terms.items()}
+    of_others = {name: frozen.of_others(spec, term.attribute, chosen[name]) for name, term in terms.items()}
     in_mjcf = {name: _places_in_mjcf(spec, model, term.attribute, chosen[name], parts) for name, term in terms.items()}
     base = _prepared(spec, model, terms, chosen)
     made = tuple(
@@ -86,7 +86,7 @@ def vary(
     validation.raise_all(_of_axes(parts.varied), "vary")
     nominal = parts.completed(nominal)
     owned_by(base, parts.terms, [term.bind(base) for term in parts.terms], nominal)
-    inertials.warn_of_stale(spec, parts.varied, terms)
+    frozen.warn_of_stale(spec, parts.varied, terms)
     without = parts.varied[: -len(made)]
     points.warn_of_ended(*(specs.compiled(points.end(spec.copy(), v), "arena.spec") for v in (without, parts.varied)))
     return spec, parts, nominal

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mjx_arenas.build import assemble
-from mjx_arenas.build.inertials import check_made
+from mjx_arenas.build import assemble, frozen
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
 from mjx_arenas.params.params import ArenaParams, with_values
 from mjx_arenas.primitives import PRIMITIVES, around
@@ -84,7 +83,7 @@ def prove(spec: mujoco.MjSpec, parts: Parts, nominal: ArenaParams, maker: str) -
         told = {"names": sorted(edited), "maker": maker}
         told |= {"part": ", part", "of_part": ", of the part"} if parts.furniture else {"part": "", "of_part": ""}
         raise validation.error([problem("arena.spec", "decided", None, None, told)])
-    check_made(own, parts.varied)
+    frozen.check(own, parts.varied)
     pinned = frozenset(f"stat.{name}" for name in STATISTICS if not np.isnan(getattr(spec.stat, name)).any())
     placed, led, turned = (
         frozenset(key.name for key in spec.keys if len(getattr(key, x))) for x in ("qpos", "mpos", "mquat")

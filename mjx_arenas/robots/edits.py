@@ -187,8 +187,7 @@ def _draw_on(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
 def _reshape(model: mujoco.MjModel, index: int, geom: mujoco.MjsGeom, shape: Fitted, hulls: Mapping[int, str]) -> None:
     """Gives a geom another shape where its mesh stands, which is as in the model, where it has an index; names of hulls by meshes."""
     stands = np.array(model.geom_pos[index]), np.array(model.geom_quat[index])
-    if geom.frame is not None:  # the model has poses in the body
-        geom.set_frame(geom.parent.add_frame())
+    specs.out_of_frames(geom)  # the model has poses in the body
     geom.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     if shape.kind == "hull":
         specs.assign(geom, meshname=hulls[int(model.geom_dataid[index])], pos=stands[0], quat=stands[1])

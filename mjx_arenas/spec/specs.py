@@ -116,6 +116,12 @@ def assign(element: object, **attributes: object) -> None:
         setattr(element, name, value)
 
 
+def out_of_frames(element: Any) -> None:
+    """Takes an element of a body, or a body, out of its frames: its pose is then in numbers that of what it hangs on."""
+    if element.frame is not None:
+        element.set_frame(element.parent.add_frame())  # one that changes nothing: MuJoCo takes no None
+
+
 def ancestors(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
     """A body and all that it hangs on, but for the world."""
     found = []

@@ -106,8 +106,7 @@ def _ball_limits(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
 
 def _along(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
     """Anchor and axis as the compiler found them, in no frame but the body's."""
-    if element.frame is not None:
-        element.set_frame(element.parent.add_frame())
+    specs.out_of_frames(element)
     specs.assign(element, pos=model.jnt_pos[index], axis=model.jnt_axis[index])
 
 

@@ -10,6 +10,7 @@ from mjx_arenas.geometry import Array, array_module
 from mjx_arenas.problem import Told, problem
 from mjx_arenas.problems.messages import error
 from mjx_arenas.quaternions import quat_mul
+from mjx_arenas.spec import specs
 from mjx_arenas.terms.attributes.attribute import (
     GEOM,
     KINDS,
@@ -96,8 +97,7 @@ def posed(kind: str) -> Callable[[mujoco.MjSpec, Any, mujoco.MjModel, int], None
 
     def prepare(spec: mujoco.MjSpec, element: Any, model: mujoco.MjModel, index: int) -> None:
         """The pose by position and quaternion, in the frame of what the element hangs on."""
-        if element.frame is not None:
-            element.set_frame(element.parent.add_frame())
+        specs.out_of_frames(element)
         if hasattr(element, "alt"):
             element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         if hasattr(element, "fromto"):

@@ -1,4 +1,4 @@
-"""Inertials, and what else the compiler made of other numbers, that stay when these vary or are edited (host)."""
+"""Numbers that the compiler made of others, such as inertials of geoms, until a term froze them: what would change them now (host)."""
 
 from collections.abc import Collection, Sequence
 
@@ -16,7 +16,7 @@ _MOVING = {"geom.size": "size", "geom.pos": "place", "geom.rpy": "orientation"}
 _SAME = 1e-9  # relative
 
 
-def made_of_others(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) -> tuple[str, ...]:
+def of_others(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) -> tuple[str, ...]:
     """The elements of a term that gets numbers of its own, which the compiler has made of others until now.
 
     These are inertials of bodies and masses, made of geoms, and lengths of tendons at rest, measured at `qpos0`.
@@ -29,7 +29,7 @@ def made_of_others(spec: mujoco.MjSpec, attribute: str, names: Sequence[str]) ->
     return tuple(name for name in lengths if springs.measured(spec.tendon(name)))
 
 
-def check_made(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
+def check(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
     """Refuses what was added or edited since `arena.vary` has read numbers that are made of it, which are still those of before.
 
     Args:
