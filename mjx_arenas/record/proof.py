@@ -13,7 +13,7 @@ import numpy as np
 
 from mjx_arenas.build import assemble, frozen
 from mjx_arenas.named import NOT_IN_MODEL, WEIGHT, put
-from mjx_arenas.params.params import ArenaParams, with_values
+from mjx_arenas.params.params import ArenaParams, named, with_values
 from mjx_arenas.primitives import PRIMITIVES, around
 from mjx_arenas.problem import problem
 from mjx_arenas.record import refusals
@@ -261,7 +261,8 @@ def _refuse(
         if far_apart(scene.model, field, value, array(scene.model, field)).reshape(-1)[at]:
             moving.append(term)
     of = f" (of {' and '.join(repr(term.name) for term in moving)})" if moving else ""
-    quantities = [name for term in moving for name in term.quantities if name in quantities] or quantities
+    there = [name for name in quantities if np.size(named(params)[name])]
+    quantities = [name for term in moving for name in term.quantities if name in quantities] or there
     told = {"element": _name(scene.model, field, at), "quantities": _listed(quantities), "of": of}
     told["why"] = WHY.get(field, WHY_ELSE)
     raise validation.error([problem("arena.spec", "stale", None, None, told)])
