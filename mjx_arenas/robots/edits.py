@@ -15,6 +15,7 @@ from mjx_arenas.robots.fitting import Fitted
 from mjx_arenas.robots.report import Cost, Reshaped, SimplifyReport
 from mjx_arenas.robots.rules import Rules
 from mjx_arenas.spec import comparing, masses, specs
+from mjx_arenas.terms.attributes import prepare
 
 _STAYS = (
     *(
@@ -151,16 +152,7 @@ def _keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: Collectio
         for geom in body.geoms:
             geom.mass = 0
     for body in kept:
-        own = {
-            "mass": model.body_mass,
-            "inertia": model.body_inertia,
-            "ipos": model.body_ipos,
-            "iquat": model.body_iquat,
-        }
-        specs.assign(
-            body, explicitinertial=True, fullinertia=np.full(6, np.nan), **{k: v[body.id] for k, v in own.items()}
-        )
-        body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        prepare.weighed(spec, body, model, body.id)
 
 
 def _add_hulls(spec: mujoco.MjSpec, model: mujoco.MjModel, shapes: Mapping[int, Fitted]) -> dict[int, str]:
