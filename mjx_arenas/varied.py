@@ -329,7 +329,7 @@ class Varied(Drawn):
 
     def _check_relative(self, model: mjx.Model, ranges: ArenaRanges) -> None:
         """Refuses a template of which numbers were edited that ranges are relative to: draws start from the arena's own."""
-        relative = frozenset(name for name, dist in ranges.terms.items() if dist.relative)
+        relative = frozenset(name for name, dist in ranges.given_terms.items() if dist.relative)
         if ("relative", relative) in self._found_right(model):
             return
         found = other_than_compiled(self.record.scene, model, relative)

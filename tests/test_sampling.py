@@ -117,6 +117,9 @@ def test_terms_without_a_distribution_stay_nominal():
     jax.tree.map(np.testing.assert_array_equal, *drawn)
     np.testing.assert_array_equal(drawn[1].terms["mass"], arena.nominal_params().terms["mass"])
     assert widening(arena, mja.ArenaRanges(terms={"mass": None}))(0.5).terms == {}
+    relative = mja.ArenaRanges(terms={"mass": None, "friction": mja.Uniform(0.9, 1.1, relative="scale")})
+    batch = arena.randomize(arena.put_model("jax"), mja.world_keys(0, range(2)), relative)
+    np.testing.assert_array_equal(batch.params.terms["mass"], [arena.nominal_params().terms["mass"]] * 2)
 
 
 @pytest.mark.slow

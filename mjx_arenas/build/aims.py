@@ -35,8 +35,9 @@ def _sure(parts: Parts, ranges: ArenaRanges, nominal: Nominal) -> np.ndarray:
     """(T + K + E,) bool: tables, objects, and others that come and go, that are there in all worlds."""
     tables, objects, *_ = validation_ranges.presence(ranges, nominal, most=False)
     terms, first = dict(nominal.params.terms), len(tables) + len(objects)
-    for name in (one.name for one in parts.coming if one.name in ranges.terms):
-        dist, value = ranges.terms[name], np.asarray(terms[name])
+    given = ranges.given_terms
+    for name in (one.name for one in parts.coming if one.name in given):
+        dist, value = given[name], np.asarray(terms[name])
         least = np.zeros_like(value) if validation_ranges.traced(dist) else validation_ranges.reach(dist, value)[0]
         terms[name] = np.asarray(least).astype(bool)
     least = nominal.params._replace(table_active=tables, object_active=objects, terms=terms)

@@ -103,8 +103,10 @@ def _places_in_mjcf(
     kind = attribute.partition(".")[0]
     if kind not in KINDS or not attribute.endswith(_OUT_OF_FRAMES):
         return None
-    before = [one for one in parts.varied if one.kind == kind and one.in_mjcf is not None]
-    earlier = {name: place for one in before for name, place in zip(one.elements, one.in_mjcf, strict=True)}
+    earlier: dict[str, np.ndarray] = {}
+    for one in parts.varied:
+        if one.kind == kind and one.in_mjcf is not None:
+            earlier |= zip(one.elements, one.in_mjcf, strict=True)
     elements = {name: in_spec(spec, kind, name) for name in names}
     now = [np.full(3, np.nan) if _from_to(element) else element.pos for element in elements.values()]
     told = np.array([earlier.get(name, place) for name, place in zip(names, now, strict=True)]).reshape(-1, 3)

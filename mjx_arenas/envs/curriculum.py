@@ -48,7 +48,7 @@ def widening(arena: Arena, ranges: ArenaRanges) -> RangesAt:
     def at(level: jax.Array) -> ArenaRanges:
         given = ranges.distributions.items()
         found = {name: _at(level, dist, nominal[name], quantities[name]) for name, dist in given}
-        terms = {name: found.pop(name) for name in ranges.terms if name in found}
+        terms = {name: found.pop(name) for name in ranges.given_terms}
         return ranges._replace(**found, terms=terms)
 
     return at

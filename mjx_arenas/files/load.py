@@ -138,12 +138,11 @@ def save(path: str | os.PathLike, arena: Arena, ranges: ArenaRanges | None = Non
     writer = Writer(file)
     data: dict[str, Any] = {"arena": writer.arena(arena.calls, ("arena",))}
     varying = {name: dist for name, dist in ranges._asdict().items() if dist is not None and name != "terms"}
-    in_terms = {name: dist for name, dist in ranges.terms.items() if dist is not None}
-    if varying or in_terms:
+    if varying or ranges.given_terms:
         data["ranges"] = {name: writer.named(calls.plain(dist), ("ranges", name)) for name, dist in varying.items()}
-    if in_terms:
+    if ranges.given_terms:
         at = ("ranges", "terms")
-        terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in in_terms.items()}
+        terms = {name: writer.named(calls.plain(dist), (*at, name)) for name, dist in ranges.given_terms.items()}
         data["ranges"]["terms"] = terms
     if "ranges" in data:
         data["ranges"] = named(data["ranges"], arena)

@@ -140,7 +140,12 @@ class ArenaRanges(NamedTuple):
     def distributions(self) -> dict[str, Distribution]:
         """The distributions that are given, by the names of their quantities."""
         own = {name: dist for name, dist in self._asdict().items() if isinstance(dist, Distribution)}
-        return own | {name: dist for name, dist in self.terms.items() if dist is not None}
+        return own | self.given_terms
+
+    @property
+    def given_terms(self) -> dict[str, Distribution]:
+        """Those of `terms`."""
+        return {name: dist for name, dist in self.terms.items() if dist is not None}
 
     @property
     def varying(self) -> frozenset[str]:

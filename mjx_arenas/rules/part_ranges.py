@@ -43,7 +43,7 @@ def reach_problems(ranges: ArenaRanges, nominal: Nominal, labels: Labels) -> lis
         name, own = f"{part.name}.{condition.of}", _Read(standing.numbers_of(part, nominal.params))
         condition.holds(own)
         others = {f"{part.name}.{one}" for one in own.names - {condition.of}}
-        if not part.parameters[condition.of].starts or others & set(ranges.terms):
+        if not part.parameters[condition.of].starts or others & set(ranges.given_terms):
             continue
         for bound in _bounds(name, dist, nominal):
             wrong = []

@@ -135,7 +135,7 @@ def presence(
         dist, value = getattr(ranges, name), np.asarray(getattr(params, name))
         bounds[name] = (value, value) if dist is None or traced(dist) else reach(dist, value)
     tables, objects = (bounds[name][side].astype(bool) for name in ("table_active", "object_active"))
-    terms, given, enough = dict(params.terms), ranges.distributions, np.any if most else np.all
+    terms, given, enough = dict(params.terms), ranges.given_terms, np.any if most else np.all
     for name in surfaces.presence(nominal.furniture) & set(given):
         dist, value = given[name], terms[name]
         terms[name] = np.zeros_like(value) if traced(dist) else reach(dist, value)[side].astype(bool)

@@ -124,8 +124,8 @@ def drawing(nominal: Nominal, ranges: ArenaRanges) -> list[Drawing]:
     """All quantities that are drawn, but for `object_tables` and `workspace`."""
     found, base = [], named(canonical(nominal.params))
     base["object_densities"] = jnp.asarray(nominal.object_densities, jnp.result_type(float))
-    given = ranges.distributions
-    for name, dist in given.items():
+    given = ranges.given_terms
+    for name, dist in ranges.distributions.items():
         if name in base and name not in (*nominal.params.terms, "object_tables"):
             tags = None if name in QUANTITIES and QUANTITIES[name].of == "table" else nominal.object_tags
             found.append(Drawing(name, dist, base[name], name, tags, np.ones(base[name].shape, bool)))
