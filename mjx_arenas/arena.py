@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mjx_arenas import dr, textures
-from mjx_arenas.build import assemble, attach, cameras, furnish, keyframes, materials, overlaps, scene, vary
+from mjx_arenas.build import assemble, attach, cameras, frozen, furnish, keyframes, materials, overlaps, scene, vary
 from mjx_arenas.compiled import one_at_a_time
 from mjx_arenas.furniture.part import Part
 from mjx_arenas.keywords import made_by, with_known_methods
@@ -282,8 +282,7 @@ class Arena(Varied, WithoutRobosuites):
 
     def adopt_spec(self, spec: mujoco.MjSpec) -> None:
         """Takes the MJCF that `mja.save` wrote of this arena in the place of `spec`. Nothing in it counts as edited since `vary`."""
-        varied = tuple(dataclasses.replace(one, made=()) for one in self._parts.varied)
-        self.spec, self._parts = spec, dataclasses.replace(self._parts, varied=varied)
+        self.spec, self._parts = spec, dataclasses.replace(self._parts, varied=frozen.as_held(spec, self._parts.varied))
 
     def merge(self, other: "Arena", prefix: str, pos: Sequence[float] = (0, 0, 0), rot: float = 0.0) -> "Arena":
         """Returns a new arena with everything from both arenas.

@@ -54,10 +54,11 @@ def scale(model: mujoco.MjModel, field: str, values: np.ndarray) -> np.ndarray:
     return _norms(values) if field in _VECTORS else values
 
 
-def nothing(model: mujoco.MjModel, field: str, rounding: float) -> float:
-    """The most that rounding leaves of a number of a field that is 0: the inverse weight of a tendon that no joint makes longer.
+def nothing(model: mujoco.MjModel, field: str, rounding: float) -> np.ndarray:
+    """The most that rounding leaves of numbers of a field that are 0, in its shape: inverse weights of tendons that no joint makes longer.
 
-    That is a square of differences between places, by the largest inverse inertia.
+    Of a tendon between places it is the square of what is left when these are subtracted, by the largest inverse inertia of the joints
+    that move them. Fixed tendons have their coefficients, and nothing is left of others.
 
     Args:
         model: compiled.
@@ -65,10 +66,22 @@ def nothing(model: mujoco.MjModel, field: str, rounding: float) -> float:
         rounding: of a number, relative to itself.
     """
     if field != "tendon_invweight0":
-        return 0.0
-    return rounding**2 * (1 + model.stat.extent**2) * float(model.dof_invweight0.max(initial=0.0))
+        return np.zeros(())
+    moves = np.zeros(model.nbody)
+    for body in range(1, model.nbody):
+        first, n = model.body_dofadr[body], model.body_dofnum[body]
+        own = model.dof_invweight0[first : first + n].max(initial=0.0) if n else 0.0
+        moves[body] = max(moves[model.body_parentid[body]], own)
+    geoms = dict.fromkeys(map(int, (_WRAP.mjWRAP_SPHERE, _WRAP.mjWRAP_CYLINDER)), model.geom_bodyid)
+    of = geoms | {int(_WRAP.mjWRAP_SITE): model.site_bodyid}
+    found = np.zeros(model.ntendon)
+    for tendon, (first, n) in enumerate(zip(model.tendon_adr, model.tendon_num, strict=True)):
+        wraps = zip(*(x[first : first + n].tolist() for x in (model.wrap_type, model.wrap_objid)), strict=True)
+        found[tendon] = max((moves[of[kind][i]] for kind, i in wraps if kind in of), default=0.0)
+    return rounding**2 * (1 + model.stat.extent**2) * found
 
 
+_WRAP = mujoco.mjtWrap
 _DOUBLE = 1e-9  # of rounding in double precision, far more than there is
 
 

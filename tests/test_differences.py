@@ -246,9 +246,11 @@ def test_tendons_that_no_joint_makes_longer(coef):
     </worldbody><tendon><spatial name="t"><site site="e"/><site site="r"/></spatial>
     <fixed name="f"><joint joint="j" coef="{}"/></fixed></tendon></mujoco>"""
     arena = mja.Arena.from_xml(xml.format(0.1, coef))
-    arena.vary(mass=dr.Term("geom.mass"))
+    arena.vary(mass=dr.Term("geom.mass"), turn=dr.Term("body.rpy", "b"))
     params = jax.tree.map(np.asarray, arena.nominal_params())
-    params = params._replace(terms={"mass": params.terms["mass"] * [0.7, 1.3, 2.0]})
+    params = params._replace(
+        terms={"mass": params.terms["mass"] * [0.7, 1.3, 2.0], "turn": np.array([[0.3, 0.2, 0.1]])}
+    )
     model, compiled = arena.apply(arena.put_model("warp"), params), arena.compile(params)
     assert mja.differences(model, compiled).get("tendon_invweight0", 0.0) < 2e-5
     other = mujoco.MjModel.from_xml_string(xml.format(0.1, coef + 1e-5))

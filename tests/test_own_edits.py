@@ -131,6 +131,30 @@ def test_edited_before_vary_and_saved(attribute, tmp_path):
     assert other.geom("tip").friction.tolist() == [0.3, 0.1, 0.1]
 
 
+@pytest.mark.parametrize("attribute", ["body.mass", "body.ipos"])
+def test_edited_after_it_was_loaded(attribute, tmp_path):
+    """What the MJCF beside a file tells of geoms still counts: a body would keep the mass of before."""
+    geoms = '<geom name="box" size=".03" density="800"/><geom name="tip" size=".02" pos=".1 0 0"/>'
+    arena = mja.Arena.from_xml(scene(stands=f'<body name="it"><joint axis="0 1 0"/>{geoms}</body>'))
+    arena.spec.geom("tip").friction = (0.3, 0.1, 0.1)
+    arena.vary(it=dr.Term(attribute, "it"))
+    mja.save(tmp_path / "arena.yaml", arena)
+    again = mja.load(tmp_path / "arena.yaml")[0]
+    again.spec.geom("tip").density = 1003
+    with pytest.raises(ValueError, match=r"what the geoms of body 'it' weigh was edited after `arena.vary\(it=...\)`"):
+        again.mj_model  # noqa: B018
+
+
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
+def test_all_weighed_anew_after_vary():
+    box = '<body name="it"><joint axis="0 1 0"/><geom name="box" type="box" size=".1 .05 .02"/></body>'
+    arena = mja.Arena.from_xml(scene(stands=box))
+    arena.vary(it=dr.Term("body.ipos", "it"))
+    arena.spec.compiler.settotalmass = 3
+    with pytest.raises(ValueError, match="settotalmass"):
+        arena.mj_model  # noqa: B018
+
+
 @pytest.mark.parametrize("given", ["", 'springlength="0.2 0.2"', 'springlength="-0.1 0.5"', 'springlength="-1 0.5"'])
 def test_tendons_edited_after_vary(given):
     """The length at rest is measured where the sites are, unless the MJCF gives it."""

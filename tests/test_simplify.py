@@ -250,6 +250,33 @@ def test_meshes_that_something_else_has(on, more):
     assert [mesh.name for mesh in spec.meshes] == ["pad"]
 
 
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass' is deprecated")
+def test_what_would_change_is_refused():
+    """Bounds of masses come before the total, and the compiler would use them again on what both have made."""
+    corners = 'vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"'
+    xml = f"""<mujoco><compiler settotalmass="1" boundmass=".6"/><asset><mesh name="m" {corners}/></asset><worldbody>
+    <body name="a"><joint axis="0 1 0"/><geom type="mesh" mesh="m" mass="1"/><body name="b" pos=".3 0 0"><joint axis="0 1 0"/>
+    <geom size=".05" mass=".1"/></body></body></worldbody></mujoco>"""
+    with pytest.raises(
+        ValueError, match=r"with simpler shapes MuJoCo would compile another body_inertia, body_mass\. If"
+    ):
+        mja.simplify(xml)
+
+
+@pytest.mark.parametrize(
+    "geom", ['type="plane" size="1 1 .1" pos="0 0 .1"', 'size=".1" mass="0"', 'size=".1" group="5"']
+)
+def test_inertials_that_no_geom_makes(geom):
+    """The compiler keeps that of a body whose geoms weigh nothing, also where it makes all of geoms."""
+    corners = 'vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"'
+    xml = f"""<mujoco><compiler inertiafromgeom="true" inertiagrouprange="0 3"/><asset><mesh name="m" {corners}/></asset><worldbody>
+    <body name="base" pos="3 0 0"><inertial pos=".5 0 0" mass="9" diaginertia="1 1 1"/><geom {geom}/>
+    <body name="arm"><joint axis="0 1 0"/><geom type="mesh" mesh="m" mass="1"/></body></body></worldbody></mujoco>"""
+    before, after = mujoco.MjModel.from_xml_string(xml), mja.simplify(xml)[0].compile()
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_iquat"):
+        np.testing.assert_allclose(getattr(after, field), getattr(before, field), rtol=1e-6, atol=1e-12, err_msg=field)
+
+
 def test_inertials_that_the_compiler_overrules():
     """Those of bodies whose geoms stay, too, which another rule of the compiler would give back."""
     xml = """<mujoco><compiler inertiafromgeom="true"/><asset><mesh name="rod" vertex="0 0 0 .2 0 0 0 .3 0 0 0 .15"/></asset>

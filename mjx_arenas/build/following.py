@@ -10,7 +10,7 @@ from mjx_arenas.build.from_mjcf import mover
 from mjx_arenas.keywords import nearest
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import specs
+from mjx_arenas.spec import scaled, specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.follow import Follow, Follower
 from mjx_arenas.terms.parts import TableNames
@@ -135,6 +135,7 @@ def _is_along(axis: np.ndarray) -> bool:
 def _settle(spec: mujoco.MjSpec, one: Follower, names: TableNames, quat: np.ndarray) -> None:
     """Has a geom's place and size be numbers that parameters decide."""
     geom, body = spec.geom(one.geom), spec.body(names.body)
+    scaled.refuse(spec, [geom], "follow", ("entry", one.geom))
     if geom.parent != body:
         geom = specs.move_geom(spec, geom, body)
     specs.out_of_frames(geom)

@@ -11,7 +11,7 @@ from mjx_arenas.build import assemble
 from mjx_arenas.params.params import QUANTITIES, ArenaParams
 from mjx_arenas.problem import Problem, problem
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import patterns, specs
+from mjx_arenas.spec import patterns, scaled, specs
 from mjx_arenas.spec.extents import extents
 from mjx_arenas.spec.of_scene import UPRIGHT
 from mjx_arenas.terms.parts import Parts, TableNames
@@ -39,6 +39,7 @@ def adopt_tables(
     problems += _given_again(given)
     validation.raise_all(problems, "from_xml")
     slabs = [slab for _, slab in given]
+    scaled.refuse(spec, [slab for _, slab in given], "tables")
     for name, slab in given:
         if not slab.parent.name:
             slab.parent.name = unused(name, {b.name for b in spec.bodies})

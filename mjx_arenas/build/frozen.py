@@ -1,6 +1,7 @@
 """Numbers that the compiler made of others, such as inertials of geoms, until a term froze them: what would change them now (host)."""
 
-from collections.abc import Collection, Sequence
+import dataclasses
+from collections.abc import Collection, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -39,6 +40,37 @@ def check(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
     Raises:
         ValueError: a body would have another mass, centre of mass or inertia, a geom another mass, or a tendon another length at rest.
     """
+    for one, changed in _changed(spec, varied):
+        if one.kind == "body" and spec.compiler.settotalmass > 0:
+            told = {"names": ["settotalmass"], "varied": one.name}
+            raise error([problem("spec.compiler", "compiler_weighs_all", None, None, told)])
+        told = {"what": _TOLD[one.kind].format(changed[0]), "name": one.name}
+        raise error([problem("arena.spec", "edited_since", None, None, told)])
+
+
+def as_held(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> tuple[Elements, ...]:
+    """The terms of an arena of which a file holds the spec, with which nothing counts as edited since they have read it.
+
+    MuJoCo writes the inertial of a body, but not always what its geoms weigh. What then cannot be told is not looked at any more.
+    """
+
+    def tells(one: Elements, name: str) -> bool:
+        element = getattr(spec, one.kind)(name)
+        return element is not None and (one.kind != "body" or any(map(_weighs, element.geoms)))
+
+    kept = [dataclasses.replace(one, made=tuple(x for x in one.made if tells(one, x))) for one in varied]
+    changed = {one.name: names for one, names in _changed(spec, kept)}
+    return tuple(
+        dataclasses.replace(one, made=tuple(x for x in one.made if x not in changed.get(one.name, ()))) for one in kept
+    )
+
+
+def _weighs(geom: mujoco.MjsGeom) -> bool:
+    return masses.weighs(geom) and masses.weight(geom) > 0
+
+
+def _changed(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> Iterator[tuple[Elements, list[str]]]:
+    """The terms of whose elements the compiler would make other numbers now than it did, with the names of these."""
     terms = [one for one in varied if one.made]
     if not terms:
         return
@@ -54,12 +86,8 @@ def check(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> None:
     model = specs.compiled(probe.copy(), "arena.spec")
     for one in terms:
         changed = _other_geoms(probe, model, one) if one.kind == "geom" else _others(model, one)
-        if changed and one.kind == "body" and spec.compiler.settotalmass > 0:
-            told = {"names": ["settotalmass"], "varied": one.name}
-            raise error([problem("spec.compiler", "compiler_weighs_all", None, None, told)])
         if changed:
-            told = {"what": _TOLD[one.kind].format(changed[0]), "name": one.name}
-            raise error([problem("arena.spec", "edited_since", None, None, told)])
+            yield one, changed
 
 
 _TOLD = {

@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import functools
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -61,17 +62,18 @@ def text(spec: mujoco.MjSpec) -> str:
             setattr(spec.compiler, name, True)
     specs.make_paths_absolute(spec, "arena.spec")
     order.put_frames_in_order(spec)
-    spec.compile()
+    model = spec.compile()
     try:
         root = ElementTree.fromstring(in_full(spec))
     except ElementTree.ParseError as refused:
         raise error([problem("arena.spec", "unread_mjcf", text=f"{refused}.")]) from None
     for element in root.iter("site"):
-        if (name := element.get("name")) and (site := spec.site(name)) is not None:
-            element.set("size", _numbers(site.size))
+        if (name := element.get("name")) and spec.site(name) is not None:
+            element.set("size", _numbers(model.site(name).size))
     for actuator, element in zip(spec.actuators, root.iterfind("actuator/*"), strict=True):
         if specs.has_dampratio(actuator):
-            element.set("biasprm", _numbers(actuator.biasprm))
+            written = [float(x) for x in element.get("biasprm", "0 0 0").split()]
+            element.set("biasprm", _numbers([*written[:2], actuator.biasprm[2], *written[3:]]))
     for element in root.iterfind("custom/text"):
         if element.text:  # which MuJoCo writes as CDATA, and does not read in another form
             element.set("data", element.text)
@@ -80,7 +82,7 @@ def text(spec: mujoco.MjSpec) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _numbers(values: np.ndarray) -> str:
+def _numbers(values: Sequence[float] | np.ndarray) -> str:
     return " ".join(f"{x:.17g}" for x in np.asarray(values))
 
 

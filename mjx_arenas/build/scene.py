@@ -10,7 +10,7 @@ import mujoco
 from mjx_arenas.build import assemble, following, from_mjcf, scene_objects
 from mjx_arenas.params.params import ArenaParams
 from mjx_arenas.rules import validation, validation_objects
-from mjx_arenas.spec import masses, scaled, specs
+from mjx_arenas.spec import masses, specs
 from mjx_arenas.spec.follow import Follow
 from mjx_arenas.spec.objects import Object
 from mjx_arenas.spec.of_scene import SCENE
@@ -34,7 +34,6 @@ def adopt(
     """
     spec = specs.read(xml, "xml")
     if tables or objects:
-        scaled.refuse(spec, "xml")
         masses.allow_inertials(spec)
     names, table_params = from_mjcf.adopt_tables(spec, tables, priority)
     bodies, slabs = [n.body for n in names], [n.collision for n in names]

@@ -10,7 +10,7 @@ import numpy as np
 from mjx_arenas import shapes
 from mjx_arenas.build.from_mjcf import RESTS, unused
 from mjx_arenas.problem import Item, Problem, problem
-from mjx_arenas.spec import masses, objects, specs
+from mjx_arenas.spec import masses, objects, scaled, specs
 from mjx_arenas.spec.extents import volumes
 from mjx_arenas.spec.objects import Measures, Object
 from mjx_arenas.spec.of_scene import SCENE, SceneObject, Stance, primitive, stance
@@ -122,6 +122,7 @@ class _Scene(NamedTuple):
 def _adopted(spec: mujoco.MjSpec, scene: _Scene, obj: Object) -> SceneObject | list[Problem]:
     """A body of the scene as an object, or what is wrong with it."""
     model, body = scene.model, spec.body(obj.name)
+    scaled.refuse(spec, scaled.of_body(body), "objects", _item(obj))
     index = model.body(obj.name).id
     hits = scene.hits(index)
     if not hits.any():

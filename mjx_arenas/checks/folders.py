@@ -209,7 +209,7 @@ def _reading(file: pathlib.Path) -> Iterator[None]:
     """Answers a damaged file with one sentence that names it."""
     if not file.is_file():
         within = sorted(one.parent.name for one in file.parent.glob(f"*/{file.name}"))
-        inside = f"; {within[0]!r} in it is one" if within else ""
+        inside = f"; {within[0]!r} in it may be one" if within else ""
         given = {"file": file.name, "inside": inside}
         raise messages.error([problem("bundle", "bundle_lacks", None, str(file.parent), given)], kind=FileNotFoundError)
     try:

@@ -105,6 +105,7 @@ def _off(twin: mujoco.MjModel, field: str, got: np.ndarray, want: np.ndarray) ->
     size = scales.scale(twin, field.removeprefix("_impl."), want)
     size = np.maximum(size, _ROUNDED * np.abs(want).max(-1, initial=0.0, keepdims=True))
     none = scales.nothing(twin, field.removeprefix("_impl."), _SINGLE)
+    none = none if none.shape == want.shape else none.max(initial=0.0)  # of what is in both worlds
     same = (got == want) | (np.isnan(got) & np.isnan(want)) | (np.maximum(np.abs(got), np.abs(want)) <= none)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(

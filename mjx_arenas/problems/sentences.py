@@ -325,9 +325,10 @@ GENERAL = {
     "`spec, report = simplify(...)`.",
     "no_mjcf": "{at}: there is no file {got}{near}.",
     "mjcf_folder": "{at} must be a file, got the folder {got}.",
-    "scaled": "{at}: {kind} {name!r} is in a <frame> with a `scale` or `massscale`, so its numbers are not those that MuJoCo compiles. "
+    "scaled": "{at}: {name} is in a <frame> with a `scale` or `massscale`, so its numbers are not those that MuJoCo compiles. "
     "After `spec.compile()`, `spec.to_xml()` has those.",
-    "not_simplified": "{at}: simpler shapes would change {names} of the MJCF, which they must not: please report this.",
+    "not_simplified": "{at}: with simpler shapes MuJoCo would compile another {names}. If its compiler has rules of masses (`boundmass`, "
+    "`boundinertia`, `settotalmass`), switch them off.",
     "bodiless": "{at} must have a body beside the world: it has none.",
     "named_robot": "{at}: there is no file {got}. `mja.robots.load` finds robots of installed packages by their names.",
     "no_root": "{at}: the text is not MJCF, as its root is not <mujoco>.",

@@ -14,7 +14,7 @@ from mjx_arenas.robots import convex, fitting, rules
 from mjx_arenas.robots.fitting import Fitted
 from mjx_arenas.robots.report import Cost, Reshaped, SimplifyReport
 from mjx_arenas.robots.rules import Rules
-from mjx_arenas.spec import comparing, masses, specs
+from mjx_arenas.spec import comparing, masses, scaled, specs
 from mjx_arenas.terms.attributes import prepare
 
 _STAYS = (
@@ -51,7 +51,9 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     away = _away(spec, model, geoms, asked)
     left = [] if asked.visual else [i for i in rules.colliding(model) if i not in away]
     hidden = [i for i in left if model.geom_group[i] >= _HIDDEN]
-    _keep_inertials(spec, model, {*asked.shapes, *away, *hidden})
+    changed = {*asked.shapes, *away, *hidden}
+    scaled.refuse(spec, [geoms[i] for i in sorted(changed)], "robot")
+    _keep_inertials(spec, model, changed)
     hulls = _add_hulls(spec, model, shapes)
     for geom, shape in shapes.items():
         if asked.visual and _is_drawn(model, geom):
@@ -72,8 +74,8 @@ def simplified(spec: mujoco.MjSpec, model: mujoco.MjModel, asked: Rules) -> tupl
     for joint, align in aligns:
         joint.align = align
     after = specs.compiled(spec, "robot")
-    if changed := sorted(name for name in _STAYS if comparing.differ(asked_of, after, name)):
-        raise error([problem("robot", "not_simplified", None, None, names=changed)])
+    if others := sorted(name for name in _STAYS if comparing.differ(asked_of, after, name)):
+        raise error([problem("robot", "not_simplified", None, None, names=others)])
     reshaped = tuple(
         Reshaped(model.geom(geom).name or specs.geom_name(model, geom), _kind(model, geom), *_now(shapes.get(geom)))
         for geom in asked.shapes

@@ -13,7 +13,7 @@ from mjx_arenas.problem import problem
 from mjx_arenas.robots import edits, rules, speed
 from mjx_arenas.robots.report import SimplifyReport
 from mjx_arenas.rules import validation
-from mjx_arenas.spec import masses, scaled, specs
+from mjx_arenas.spec import masses, specs
 
 FAST: Mapping[str, Any] = {"iterations": 10, "ls_iterations": 20}
 """Options with which no world keeps all others of a batch waiting for its solver."""
@@ -68,10 +68,9 @@ def simplify(
     unclear = [problem(n, "truth", None, x) for n, x in flags.items() if not isinstance(x, (bool, np.bool_))]
     validation.raise_all(unclear, "`simplify`")
     spec = specs.read(robot, "robot")
-    scaled.refuse(spec, "robot")
-    masses.allow_inertials(spec)
     specs.assign(spec.compiler, fusestatic=False, discardvisual=False)  # or names would go
     model = specs.compiled(spec, "robot")
+    masses.allow_inertials(spec)
     validation.raise_all([problem("robot", "bodiless")] if model.nbody == 1 else [], "`simplify`")
     asked = rules.of(model, collision, keep, hull, actuators, options)
     asked = asked._replace(self_collisions=bool(self_collisions), visual=bool(visual))

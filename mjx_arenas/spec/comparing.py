@@ -97,8 +97,9 @@ def far_apart(model: mujoco.MjModel, name: str, a: np.ndarray, b: np.ndarray) ->
         return a != b
     if name == "body_invweight0":  # C's 0 is the square of what double precision rounds
         a, b = (np.where(x <= 2.0**-104 * x.max(-1, keepdims=True), 0.0, x) for x in (a, b))
-    if floor := scales.nothing(model, name, 2.0**-50):
-        a, b = (np.where(np.abs(x) <= floor, 0.0, x) for x in (a, b))
+    none = scales.nothing(model, name, 2.0**-50)
+    if none.any():
+        a, b = (np.where(np.abs(x) <= none, 0.0, x) for x in (a, b))
     off = np.abs(a - b)
     if not off.any():
         return off > 0

@@ -23,7 +23,9 @@ def weighs(geom: mujoco.MjsGeom) -> bool:
 
 
 def weight(geom: mujoco.MjsGeom) -> float:
-    """What says how heavy a geom is: its mass, or its density where it has none."""
+    """What says how heavy a geom is: its mass, or its density where it has none; a plane weighs nothing."""
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+        return 0.0
     return geom.density if np.isnan(geom.mass) else geom.mass
 
 
@@ -52,7 +54,7 @@ def allow_inertials(spec: mujoco.MjSpec) -> None:
     rules = mujoco.mjtInertiaFromGeom
     ruled = [body for body in spec.bodies if body.compiler.inertiafromgeom == rules.mjINERTIAFROMGEOM_TRUE]
     for body in ruled:
-        if any(weighs(geom) and weight(geom) for geom in body.geoms):  # else the compiler keeps what the body has
+        if any(weighs(geom) and weight(geom) > 0 for geom in body.geoms):  # else the compiler keeps what the body has
             body.explicitinertial, body.ipos = False, [np.nan] * 3
     for body in ruled:
         body.compiler.inertiafromgeom = rules.mjINERTIAFROMGEOM_AUTO

@@ -288,7 +288,7 @@ def _add_mesh(spec: mujoco.MjSpec, name: str, obj: Object) -> mujoco.MjsMesh:
 def _add_mjcf(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: Object, rigid: bool) -> None:
     item: Item = ("object", obj.name)
     child = specs.read(obj.file, "objects.file", item)
-    scaled.refuse(child, "objects.file", item)
+    scaled.refuse(child, scaled.of_body(child.worldbody), "objects.file", item)
     free = [j for top in child.worldbody.bodies for j in top.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]
     for one in (*free, *child.keys):
         child.delete(one)

@@ -79,7 +79,7 @@ ACTUATOR = {
 def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     """(N, 11) bool: the numbers of equalities that no pose at `qpos0` and no site decides, without quaternions, whose length is 1.
 
-    Those that nothing reads have no place in MJCF: the last six of joints and tendons, and the last eight of connections.
+    Those that are not given have no place in MJCF: the last six of joints and tendons, and all but the anchor of connections.
     """
     kind, data = model.eq_type[ids], model.eq_data[ids]
     sites, bodies = (model.eq_objtype[ids] == one for one in (mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY))
@@ -97,8 +97,10 @@ def _given_data(model: mujoco.MjModel, ids: np.ndarray) -> np.ndarray:
     return ~np.any([which[:, None] & columns for which, columns in not_given], axis=0)
 
 
-def _between_sites(model: mujoco.MjModel, index: int) -> str:
-    """Why a connection of sites has no numbers."""
+def _no_numbers(model: mujoco.MjModel, index: int) -> str:
+    """Why an equality has no numbers."""
+    if "FLEX" in mujoco.mjtEq(model.eq_type[index]).name:
+        return "it holds a flex, and has no numbers of its own"
     sites = model.eq_objtype[index] == mujoco.mjtObj.mjOBJ_SITE
     connects = model.eq_type[index] == mujoco.mjtEq.mjEQ_CONNECT
     return "it connects sites, and has no numbers of its own: vary `site.pos`" if sites and connects else ""
@@ -114,6 +116,6 @@ EQUALITY = {
         "eq_data",
         tuple(range(11)),
         used=_given_data,
-        refused=_between_sites,
+        refused=_no_numbers,
     ),
 }
