@@ -72,16 +72,16 @@ def nothing(model: mujoco.MjModel, field: str, rounding: float) -> np.ndarray:
         first, n = model.body_dofadr[body], model.body_dofnum[body]
         own = model.dof_invweight0[first : first + n].max(initial=0.0) if n else 0.0
         moves[body] = max(moves[model.body_parentid[body]], own)
-    geoms = dict.fromkeys(map(int, (_WRAP.mjWRAP_SPHERE, _WRAP.mjWRAP_CYLINDER)), model.geom_bodyid)
-    of = geoms | {int(_WRAP.mjWRAP_SITE): model.site_bodyid}
     found = np.zeros(model.ntendon)
     for tendon, (first, n) in enumerate(zip(model.tendon_adr, model.tendon_num, strict=True)):
-        wraps = zip(*(x[first : first + n].tolist() for x in (model.wrap_type, model.wrap_objid)), strict=True)
-        found[tendon] = max((moves[of[kind][i]] for kind, i in wraps if kind in of), default=0.0)
+        kinds, ids = model.wrap_type[first : first + n], model.wrap_objid[first : first + n]
+        sites, geoms = ids[kinds == _WRAP.mjWRAP_SITE], ids[np.isin(kinds, _ROUND)]
+        found[tendon] = moves[np.append(model.site_bodyid[sites], model.geom_bodyid[geoms])].max(initial=0.0)
     return rounding**2 * (1 + model.stat.extent**2) * found
 
 
 _WRAP = mujoco.mjtWrap
+_ROUND = (int(_WRAP.mjWRAP_SPHERE), int(_WRAP.mjWRAP_CYLINDER))
 _DOUBLE = 1e-9  # of rounding in double precision, far more than there is
 
 

@@ -131,6 +131,29 @@ def test_edited_before_vary_and_saved(attribute, tmp_path):
     assert other.geom("tip").friction.tolist() == [0.3, 0.1, 0.1]
 
 
+EDITS = {
+    "body.mass": ("it", lambda spec: setattr(spec.geom("box"), "density", 803)),
+    "geom.friction": ("box", lambda spec: setattr(spec.geom("box"), "friction", (0.7, 0.1, 0.1))),
+    "geom.size": ("box", lambda spec: setattr(spec.geom("box"), "size", (0.031, 0, 0))),
+}
+
+
+@pytest.mark.parametrize("attribute", EDITS)
+def test_edits_that_a_term_read(attribute, tmp_path):
+    """The calls in a file would read the numbers of before."""
+    arena = mja.Arena.from_xml(
+        scene(stands='<body name="it"><joint axis="0 1 0"/><geom name="box" size=".03" density="800"/></body>')
+    )
+    name, edit = EDITS[attribute]
+    edit(arena.spec)
+    arena.vary(it=dr.Term(attribute, name))
+    with pytest.raises(
+        ValueError, match=r"`arena`: `arena.spec` was edited before a term read the same numbers, which the calls"
+    ):
+        mja.save(tmp_path / "arena.yaml", arena)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("attribute", ["body.mass", "body.ipos"])
 def test_edited_after_it_was_loaded(attribute, tmp_path):
     """What the MJCF beside a file tells of geoms still counts: a body would keep the mass of before."""

@@ -10,6 +10,8 @@ from mjx_arenas.arena import Arena
 from mjx_arenas.build import mjcf
 from mjx_arenas.files.export import with_copies
 from mjx_arenas.files.output import whole
+from mjx_arenas.problem import problem
+from mjx_arenas.problems import messages
 from mjx_arenas.spec import specs
 
 NAME = "spec.xml"
@@ -30,6 +32,9 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
 
     Returns:
         Whether the MJCF gives the same model, to rounding. If not, nothing is written.
+
+    Raises:
+        ValueError: the calls that the file will have would read other numbers than those of the arena have.
     """
     spec = arena.own_spec()
     spec.compile()
@@ -37,7 +42,11 @@ def write(arena: Arena, again: Arena, file: pathlib.Path) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         fill(pathlib.Path(folder), files)
         again.adopt_spec(specs.read(pathlib.Path(folder, NAME), "spec"))
-        if mjcf.lost(arena.mj_model, again.mj_model):
+        try:
+            lost = mjcf.lost(arena.mj_model, again.mj_model)
+        except ValueError as refused:  # the calls read the spec as it was given
+            raise messages.error([problem("arena", "edited_past_calls")]) from refused
+        if lost:
             return False
     put(path_beside(file).parent, files)
     return True

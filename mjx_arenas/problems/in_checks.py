@@ -20,6 +20,8 @@ IN_CHECKS = {
     "not_made": "{at} was not made by MultiTableArena, TableArena or Arena.from_xml: its spec cannot be written.",
     "edited_past_mjcf": "{at} is not what its arguments make, since `arena.spec` was edited or one of its files has changed, and MJCF does "
     "not hold the edit: make it in an MJCF file, and give that as `xml` or to `attach`.",
+    "edited_past_calls": "{at}: `arena.spec` was edited before a term read the same numbers, which the calls in the file would read "
+    "without the edit: make it in an MJCF file or a spec, and give that as `xml` or to `attach`.",
     "file_is_folder": "{got} is a folder: give a {suffixes} file.",
     "file_suffix": "{got} must end in {suffixes}.",
     "file_is_mjcf": "{got} must end in {suffixes}: a file shows an MJCF as `arena: {{type: Arena.from_xml, xml: {name}}}`.",
