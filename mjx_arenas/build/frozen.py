@@ -56,17 +56,13 @@ def as_held(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> tuple[Elements, 
 
     def tells(one: Elements, name: str) -> bool:
         element = getattr(spec, one.kind)(name)
-        return element is not None and (one.kind != "body" or any(map(_weighs, element.geoms)))
+        return element is not None and (one.kind != "body" or any(map(masses.makes_inertial, element.geoms)))
 
     kept = [dataclasses.replace(one, made=tuple(x for x in one.made if tells(one, x))) for one in varied]
     changed = {one.name: names for one, names in _changed(spec, kept)}
     return tuple(
         dataclasses.replace(one, made=tuple(x for x in one.made if x not in changed.get(one.name, ()))) for one in kept
     )
-
-
-def _weighs(geom: mujoco.MjsGeom) -> bool:
-    return masses.weighs(geom) and masses.weight(geom) > 0
 
 
 def _changed(spec: mujoco.MjSpec, varied: Sequence[Elements]) -> Iterator[tuple[Elements, list[str]]]:

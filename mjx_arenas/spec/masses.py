@@ -22,11 +22,11 @@ def weighs(geom: mujoco.MjsGeom) -> bool:
     return low <= geom.group <= high
 
 
-def weight(geom: mujoco.MjsGeom) -> float:
-    """What says how heavy a geom is: its mass, or its density where it has none; a plane weighs nothing."""
+def makes_inertial(geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom weighs something where the compiler makes the inertial of its body of geoms."""
     if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-        return 0.0
-    return geom.density if np.isnan(geom.mass) else geom.mass
+        return False
+    return weighs(geom) and (geom.density if np.isnan(geom.mass) else geom.mass) != 0
 
 
 def weigh_groups(spec: mujoco.MjSpec) -> None:
@@ -54,7 +54,7 @@ def allow_inertials(spec: mujoco.MjSpec) -> None:
     rules = mujoco.mjtInertiaFromGeom
     ruled = [body for body in spec.bodies if body.compiler.inertiafromgeom == rules.mjINERTIAFROMGEOM_TRUE]
     for body in ruled:
-        if any(weighs(geom) and weight(geom) > 0 for geom in body.geoms):  # else the compiler keeps what the body has
+        if any(map(makes_inertial, body.geoms)):  # else the compiler keeps what the body has
             body.explicitinertial, body.ipos = False, [np.nan] * 3
     for body in ruled:
         body.compiler.inertiafromgeom = rules.mjINERTIAFROMGEOM_AUTO

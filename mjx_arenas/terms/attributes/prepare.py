@@ -27,7 +27,7 @@ def shared(geom: Any) -> bool:
 
 def weighs(geom: Any) -> bool:
     """Whether the compiler makes an inertial of the geom."""
-    return masses.inferred(geom.parent) and masses.weighs(geom) and masses.weight(geom) != 0
+    return masses.inferred(geom.parent) and masses.makes_inertial(geom)
 
 
 def always_inferred(spec: mujoco.MjSpec, element: Any) -> str:
